@@ -1,0 +1,14 @@
+//! Python bindings: convert, release the GIL, map errors. Nothing else.
+
+use pyo3::prelude::*;
+
+mod camera;
+mod convert;
+
+/// The compiled core of siloscope.
+#[pymodule]
+fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    camera::register(m)?;
+    Ok(())
+}

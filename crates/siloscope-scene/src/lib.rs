@@ -1,0 +1,1 @@
+//! Ray-casts depth frames of silos with exact truth.

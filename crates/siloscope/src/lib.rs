@@ -1,0 +1,16 @@
+//! Finds a silo's axis, and with it the transform to gravity-aligned coordinates, in a depth frame.
+//!
+//! Everything here is pure computation: no files, no printing, no global thread pool. Lengths are metres and
+//! angles radians. The camera frame is optical (x right, y down, z forward); the silo frame has its origin on the
+//! axis at the camera's height and z along gravity.
+
+pub mod camera;
+pub mod error;
+pub mod pose;
+
+pub use camera::{Camera, Distortion};
+pub use error::{Error, Result};
+pub use pose::SiloPose;
+
+/// A point or direction in three dimensions, in metres where it is a point.
+pub type Vec3 = nalgebra::Vector3<f64>;

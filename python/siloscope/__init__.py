@@ -1,0 +1,21 @@
+"""Finds a silo's axis, geometry and content from one depth camera."""
+
+from siloscope._core import __version__
+from siloscope.camera import Camera
+from siloscope.errors import InputError, SiloscopeError, UsageError
+from siloscope.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.frame import Frame
+from siloscope.pose import SiloPose
+
+__all__ = [
+    "Camera",
+    "Estimate",
+    "Frame",
+    "InputError",
+    "Ratios",
+    "SiloGeometry",
+    "SiloPose",
+    "SiloscopeError",
+    "UsageError",
+    "__version__",
+]
