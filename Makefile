@@ -1,23 +1,76 @@
-# Everything is installed into .venv from the package registries alone.
+# Everything is installed into .venv from the package registries alone: Python >= 3.11, cargo, make and a C compiler do.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-SOURCES := $(shell find crates -name '*.rs' -o -name 'Cargo.toml') Cargo.toml pyproject.toml
+SOURCES := $(shell find crates -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
+PYTHON_FILES := python tests
 
-.PHONY: setup build test
-setup: $(VENV)/.built ## installs everything into .venv
+export VIRTUAL_ENV := $(CURDIR)/$(VENV)
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_QUIET := 1
+export MPLBACKEND := Agg
+
+.DEFAULT_GOAL := help
+.PHONY: help setup build demo test check lint types rust-test python-test bench docs dist requirements format clean
+
+help: ## shows this list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
+
+setup: build ## builds and installs everything into .venv
 
 build: $(VENV)/.built
 
-$(VENV)/.installed: pyproject.toml
+$(VENV)/.installed: requirements/dev.txt
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "siloscope needs Python 3.11 or newer; name one: make PYTHON=python3.12")'
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/pip install -q 'maturin>=1.9,<2' numpy typer rich pillow matplotlib pytest hypothesis ruff mypy scipy
+	$(BIN)/python -m pip install -q --require-hashes -r requirements/dev.txt
 	touch $@
 
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
-	VIRTUAL_ENV=$(CURDIR)/$(VENV) $(BIN)/maturin develop --release -q
+	$(BIN)/maturin develop --release -q
 	touch $@
 
-test: build ## runs all tests
-	cargo test --workspace --exclude siloscope-py -q
+demo: build ## simulates a discharge, finds the axis in every frame, writes demo/report.html
+	$(BIN)/siloscope demo --out demo
+
+test: build rust-test python-test ## runs all tests
+
+rust-test:
+	cargo test -q --workspace --exclude siloscope-py
+
+python-test: build
 	$(BIN)/pytest
+
+check: lint types test docs ## lint, types, stubs, all tests, documentation: what CI runs
+
+lint: build
+	$(BIN)/ruff check $(PYTHON_FILES)
+	$(BIN)/ruff format --check $(PYTHON_FILES)
+	cargo fmt --all --check
+	cargo clippy -q --workspace --all-targets -- -D warnings
+
+types: build
+	$(BIN)/mypy
+	$(BIN)/python -m mypy.stubtest siloscope._core --allowlist tests/stubtest-allowlist.txt
+
+bench: build ## times every step of locate, a PNG decode beside it
+	$(BIN)/python benchmarks/locate.py
+
+docs: build ## builds the documentation into site/
+	$(BIN)/mkdocs build -q --strict
+
+dist: build ## builds an sdist, a wheel from that sdist, and tries the wheel in a new environment
+	.ci/try_wheel
+
+requirements: $(VENV)/.installed ## pins the development set-up anew in requirements/dev.txt
+	$(BIN)/uv pip compile -q --universal --python-version 3.11 --generate-hashes \
+		--no-emit-index-url --no-emit-find-links --custom-compile-command 'make requirements' \
+		-o requirements/dev.txt pyproject.toml requirements/dev.in
+
+format: $(VENV)/.installed ## formats all code
+	$(BIN)/ruff check -q --fix $(PYTHON_FILES)
+	$(BIN)/ruff format -q $(PYTHON_FILES)
+	cargo fmt --all
+
+clean: ## removes what was built, but not .venv
+	rm -rf target build dist site demo

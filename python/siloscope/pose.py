@@ -47,12 +47,14 @@ class SiloPose:
     @property
     def axis_direction(self) -> NDArray[np.float64]:
         """Unit direction X (3,) of the axis in the camera frame, along gravity."""
-        return self.T_silo_camera[2, :3]
+        direction: NDArray[np.float64] = self.T_silo_camera[2, :3]
+        return direction
 
     @property
     def axis_point(self) -> NDArray[np.float64]:
         """Axis point a (3,) in the camera frame, in the plane through the camera perpendicular to X."""
-        return self.T_silo_camera[:3, :3].T @ np.array([-self.t_x, -self.t_y, 0.0])
+        point: NDArray[np.float64] = self.T_silo_camera[:3, :3].T @ np.array([-self.t_x, -self.t_y, 0.0])
+        return point
 
     def to_silo(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """Points (..., 3) from the camera frame to the silo frame."""

@@ -1,0 +1,84 @@
+"""The command line. Only this package prints and exits; everything it does is a call of the public API.
+
+A command is one module here with a function whose parameters are its arguments and options, which returns the exit
+code (None for 0), and one line in `COMMANDS`.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+from typing import Any, NamedTuple
+
+import typer
+
+from siloscope.cli.outcome import guarded
+
+__all__ = ["COMMANDS", "Command", "main"]
+
+
+class Command(NamedTuple):
+    """One row of the command table."""
+
+    name: str
+    target: str
+    """``module:function`` below ``siloscope.cli``."""
+    help: str
+    """The line in ``siloscope --help``."""
+
+
+COMMANDS: tuple[Command, ...] = ()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the command line and return its exit code."""
+    arguments = sys.argv[1:] if argv is None else list(argv)
+    return guarded(lambda: _app(arguments)(args=arguments, prog_name="siloscope", standalone_mode=False), arguments)
+
+
+def _app(arguments: Sequence[str]) -> typer.Typer:
+    """The application with only the wanted command's module loaded, which keeps ``--help`` quick."""
+    app = typer.Typer(rich_markup_mode="rich", context_settings={"help_option_names": ["-h", "--help"]})
+    app.callback()(_siloscope)
+    completing = "_SILOSCOPE_COMPLETE" in os.environ
+    for command in COMMANDS:
+        function = _load(command) if completing or command.name in arguments else _not_loaded
+        text = None if function is not _not_loaded else command.help
+        app.command(command.name, help=text, short_help=command.help, no_args_is_help=False)(function)
+    return app
+
+
+def _load(command: Command) -> Callable[..., Any]:
+    module, name = command.target.split(":")
+    function: Callable[..., Any] = getattr(import_module(f"siloscope.cli.{module}"), name)
+    return function
+
+
+def _not_loaded() -> None:
+    """Stands in the list of commands for one that was not asked for."""
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        from siloscope import __version__
+
+        typer.echo(f"siloscope {__version__}")
+        raise typer.Exit
+
+
+def _siloscope(
+    version: bool = typer.Option(False, "--version", callback=_print_version, is_eager=True, help="Print the version."),
+) -> None:
+    """Find a silo's axis, geometry and content from one depth camera.
+
+    [bold]Example:[/bold] siloscope locate frame.png --camera camera.json --depth-unit 0.001
+
+    [bold]Exit codes:[/bold]
+    0 answered
+    2 wrong usage
+    3 input that can't be used
+    4 the frame does not show enough wall
+    5 some frames of several failed
+    """
