@@ -4,11 +4,13 @@ use pyo3::prelude::*;
 
 mod camera;
 mod convert;
+mod files;
 
 /// The compiled core of siloscope.
 #[pymodule]
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     camera::register(m)?;
+    files::register(m)?;
     Ok(())
 }

@@ -1,0 +1,321 @@
+"""What every format gives: a source of frames, and the terms on which it was opened."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope.camera import Camera
+from siloscope.errors import InputError
+from siloscope.frame import Frame
+from siloscope.frames.terms import UnknownUnit, finish
+
+MAX_SIDE = 20_000
+"""Largest width or height of an image, in pixels (as in `Camera`)."""
+
+MAX_PIXELS = 100_000_000
+"""Largest image, in pixels; above it the file is taken for damaged or hostile."""
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user says about the input; it always wins over what the file says.
+
+    Attributes
+    ----------
+    cameras : tuple of Camera
+        Empty, or the user's camera; several where their file lists a resolution each (the frame's size chooses).
+    depth_unit : float or None
+        Metres per raw unit (also scales floating-point depth and points).
+    stream : str or None
+        Which of several streams, by name or a part of it that fits only one.
+    ray_length : bool
+        The file's depth is the length of the ray, not z.
+    """
+
+    cameras: tuple[Camera, ...] = ()
+    depth_unit: float | None = None
+    stream: str | None = None
+    ray_length: bool = False
+
+
+class Item(NamedTuple):
+    """One frame that has not been decoded yet."""
+
+    label: str
+    """Names the frame in messages: ``frame 17``, ``0017.png``."""
+    read: Callable[[], Frame]
+    """Decodes it; raises `InputError` where it is damaged."""
+
+
+@dataclass(frozen=True)
+class Format:
+    """One entry of the registry.
+
+    Attributes
+    ----------
+    name : str
+        Short name: ``png``, ``pcd``.
+    sniff : callable (head: bytes, path: Path) -> bool
+        Whether the content is of this format, from the file's first `HEAD_BYTES` bytes (empty for a folder).
+    open : callable (path: Path, options: Options) -> FrameSource
+        Reads headers, no frames; raises `InputError`.
+    extra : str or None
+        The optional dependency group that reading needs.
+    """
+
+    name: str
+    sniff: Callable[[bytes, Path], bool]
+    open: Callable[[Path, Options], FrameSource]
+    extra: str | None = None
+
+
+HEAD_BYTES = 4096
+"""How much of a file the sniffing sees."""
+
+
+class FrameSource(ABC):
+    """Frames of one file, folder or recording, decoded one at a time while iterating.
+
+    Damaged frames are skipped and told in `problems`; a source without one readable frame raises `InputError`.
+    Iterating again starts again. Use it in a ``with`` statement, or call `close`.
+
+    A format derives from it, sets the attributes it knows, and gives `_items` and `_streams`. Sources that hold a
+    file open also extend `close`.
+
+    Attributes
+    ----------
+    path : Path
+        What was opened.
+    name : str
+        The same, as text for messages.
+    format : str
+        Name of the format.
+    options : Options
+        What the user said.
+    timestamps : list of float, or None
+        Seconds of every frame, where known without decoding.
+    gravity : float array (3,) or None
+        Direction of gravity in the camera frame, m/s², where recorded.
+    provenance : dict
+        What is known about the origin: device, serial number, stream, where camera and unit come from.
+    problems : list of str
+        What could not be read in the iteration so far: ``frame 17: truncated PNG``.
+    """
+
+    def __init__(self, path: Path, format: str, options: Options) -> None:
+        self.path = path
+        self.name = str(path)
+        self.format = format
+        self.options = options
+        self.timestamps: list[float] | None = None
+        self.gravity: NDArray[np.float64] | None = None
+        self.provenance: dict[str, Any] = {"format": format, "file": path.name}
+        self.problems: list[str] = []
+        self.file_camera: Camera | None = None
+        self.file_depth_unit: float | None = None
+
+    @abstractmethod
+    def _items(self) -> Iterator[Item]:
+        """The frames in order, undecoded.
+
+        It may raise `InputError` where the file breaks off: what came before still counts.
+        """
+
+    def _count(self) -> int | None:
+        """Number of frames, or None where only reading tells."""
+        return None
+
+    def _streams(self) -> list[dict[str, Any]]:
+        """For `describe`: one dictionary a stream with ``name``, ``kind`` (depth, points, …), ``size`` (width, height
+        or number of points), ``dtype``, ``frames`` and ``chosen``."""
+        return []
+
+    @property
+    def camera(self) -> Camera | None:
+        """The user's camera, else the file's, else None."""
+        given = self.options.cameras
+        return given[0] if len(given) == 1 else self.file_camera
+
+    @property
+    def depth_unit(self) -> float | None:
+        """Metres per raw unit: the user's, else the file's, else None."""
+        return self.file_depth_unit if self.options.depth_unit is None else self.options.depth_unit
+
+    def __len__(self) -> int:
+        count = self._count()
+        if count is None:
+            raise TypeError(f"{self.name}: the number of frames is known only after reading")
+        return count
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __iter__(self) -> Iterator[Frame]:
+        self.problems = []
+        read = 0
+        for frame in self._readable():
+            read += 1
+            yield frame
+        if not read:
+            raise self._nothing_read()
+
+    def __getitem__(self, index: int) -> Frame:
+        """One frame by its number from 0; raises `IndexError` past the end and `InputError` where it is damaged."""
+        item = next(islice(self._items(), index, None), None) if index >= 0 else None
+        if item is None:
+            raise IndexError(f"{self.name}: no frame {index}")
+        return self._finished(item)
+
+    def _readable(self) -> Iterator[Frame]:
+        for item in self._items_before_damage():
+            try:
+                frame = self._finished(item)
+            except UnknownUnit:
+                raise
+            except InputError as error:
+                self.problems.append(_told(item.label, error))
+                continue
+            yield frame
+
+    def _items_before_damage(self) -> Iterator[Item]:
+        try:
+            yield from self._items()
+        except InputError as error:
+            self.problems.append(str(error))
+
+    def _finished(self, item: Item) -> Frame:
+        frame = item.read()
+        frame = replace(
+            frame,
+            camera=frame.camera or self.file_camera,
+            depth_unit=self.file_depth_unit if frame.depth_unit is None else frame.depth_unit,
+            gravity=self.gravity if frame.gravity is None else frame.gravity,
+            source=self.name if self._count() == 1 else f"{self.name}, {item.label}",
+            provenance={**self.provenance, "frame": item.label, **frame.provenance},
+        )
+        return finish(frame, self.options)
+
+    def _nothing_read(self) -> InputError:
+        if not self.problems:
+            return InputError(f"{self.name}: no frames in it; `siloscope info` shows what is")
+        if len(self.problems) == 1:
+            return InputError(self.problems[0])
+        return InputError(
+            f"{self.name}: none of {len(self.problems)} frames can be read; the first: {self.problems[0]}"
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """What is inside, as plain data (schema ``siloscope.info/1``): the document of ``siloscope info --json``."""
+        camera, times = self.camera, self.timestamps
+        return {
+            "schema": "siloscope.info/1",
+            "file": self.name,
+            "format": self.format,
+            "frames": self._count(),
+            "streams": self._streams(),
+            "camera": camera.to_dict() if camera else None,
+            "depth_unit": self.depth_unit,
+            "gravity": None if self.gravity is None else [float(g) for g in self.gravity],
+            "timestamps": {"first": times[0], "last": times[-1]} if times else None,
+            "provenance": self.provenance,
+            "problems": self.problems,
+        }
+
+    def close(self) -> None:  # noqa: B027 (most sources hold nothing open)
+        """Lets go of the file; iterating is over."""
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+class Chain(FrameSource):
+    """Several sources one after the other; a damaged one costs only its own frames."""
+
+    def __init__(self, sources: Sequence[FrameSource], options: Options) -> None:
+        super().__init__(sources[0].path, "several", options)
+        self.name = f"{len(sources)} files"
+        self.sources = tuple(sources)
+        self.provenance = {"format": "several", "files": [source.provenance for source in sources]}
+        self.file_camera = _shared([source.camera for source in sources])
+        self.file_depth_unit = _shared([source.depth_unit for source in sources])
+
+    def _items(self) -> Iterator[Item]:
+        for source in self.sources:
+            items = source._items()
+            while (item := _next_or_damage(source, items)) is not None:
+                yield item
+
+    def _finished(self, item: Item) -> Frame:
+        return item.read()
+
+    def _count(self) -> int | None:
+        counts = [source._count() for source in self.sources]
+        return None if None in counts else sum(c for c in counts if c is not None)
+
+    def _streams(self) -> list[dict[str, Any]]:
+        return [{"file": source.name, **stream} for source in self.sources for stream in source._streams()]
+
+    def close(self) -> None:
+        for source in self.sources:
+            source.close()
+
+
+def _next_or_damage(source: FrameSource, items: Iterator[Item]) -> Item | None:
+    """The source's next frame, or in its place the error that ends the source."""
+    try:
+        item = next(items, None)
+    except InputError as error:
+        return Item(source.name, partial(_raise, error))
+    return item and Item(f"{source.name}, {item.label}", partial(source._finished, item))
+
+
+class Unreadable(FrameSource):
+    """A file among several that can't be opened; its one frame raises the reason."""
+
+    def __init__(self, path: Path, options: Options, error: InputError) -> None:
+        super().__init__(path, "unreadable", options)
+        self.error = error
+        self.problems = [str(error)]
+
+    def _items(self) -> Iterator[Item]:
+        yield Item(self.path.name, partial(_raise, self.error))
+
+    def _count(self) -> int:
+        return 1
+
+
+def _raise(error: InputError) -> Frame:
+    raise error
+
+
+def _told(label: str, error: InputError) -> str:
+    """The error with the frame named once."""
+    return str(error) if label in str(error) else f"{label}: {error}"
+
+
+def _shared(values: list[Any]) -> Any:
+    return values[0] if all(value == values[0] for value in values) else None
+
+
+def check_image_size(name: str, width: int, height: int) -> None:
+    """Raises `InputError` for an image size that is none, or too large to be a depth frame."""
+    if not (1 <= width <= MAX_SIDE and 1 <= height <= MAX_SIDE and width * height <= MAX_PIXELS):
+        raise InputError(
+            f"{name}: the image is declared {width} x {height} pixels, more than a depth frame has "
+            f"({MAX_SIDE} a side, {MAX_PIXELS} in all) or none at all; the file is damaged, export the frame again"
+        )

@@ -1,0 +1,122 @@
+"""Brings a decoded frame to the terms of the user: camera, unit, ray length. The user's word wins over the file's."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope.camera import Camera
+from siloscope.errors import InputError
+from siloscope.frame import Frame
+
+if TYPE_CHECKING:
+    from siloscope.frames.source import Options
+
+FARTHEST_M = 100.0
+"""Median depth above which floating-point "metres" are taken for some other unit."""
+
+
+class UnknownUnit(InputError):
+    """The depth's unit is not known: concerns every frame of the source, so iterating ends."""
+
+
+def finish(frame: Frame, options: Options) -> Frame:
+    """The frame with the user's camera, unit and ray length applied and checked; raises `InputError`."""
+    frame = _with_unit(frame, options.depth_unit)
+    frame = _with_camera(frame, options.cameras)
+    return _z_from_ray_length(frame) if options.ray_length else frame
+
+
+def _with_unit(frame: Frame, given: float | None) -> Frame:
+    origin = {} if given is None else {"depth_unit": given, "depth_unit_from": "given"}
+    provenance = {**frame.provenance, **origin}
+    if frame.depth is None:
+        points = frame.points if given is None or frame.points is None else frame.points * given
+        return replace(frame, points=points, depth_unit=None, provenance=provenance)
+    if np.issubdtype(frame.depth.dtype, np.floating):
+        return _with_metres(replace(frame, provenance=provenance), given)
+    return _with_raw_units(replace(frame, provenance=provenance), given)
+
+
+def _with_metres(frame: Frame, given: float | None) -> Frame:
+    depth = frame.depth
+    assert depth is not None
+    if given is not None:
+        return replace(frame, depth=depth * depth.dtype.type(given), depth_unit=None)
+    if frame.depth_unit is None and (median := _median(depth)) > FARTHEST_M:
+        raise UnknownUnit(
+            f"{frame.source}: floating-point depth is metres, but the median is {median:.4g}; "
+            "give --depth-unit (0.001 for millimetres, 1 if these are metres)"
+        )
+    return frame
+
+
+def _median(depth: NDArray[Any]) -> float:
+    few = depth.reshape(-1)[:: max(1, depth.size // 4096)]
+    few = few[np.isfinite(few) & (few > 0)]
+    return float(np.median(few)) if few.size else 0.0
+
+
+def _with_raw_units(frame: Frame, given: float | None) -> Frame:
+    unit = frame.depth_unit if given is None else given
+    if unit is None:
+        raise UnknownUnit(
+            f"{frame.source}: the depth is in raw units and nothing says what one unit is; give --depth-unit in "
+            "metres (0.001 for millimetres as most sensors and ROS write, 0.0002 for TUM, 0.00025 for some RealSense)"
+        )
+    if not (np.isfinite(unit) and 0 < unit <= 1):
+        raise UnknownUnit(f"{frame.source}: a depth unit of {unit} m is not possible; give --depth-unit in metres")
+    assert frame.depth is not None
+    if frame.depth.dtype != np.uint16:
+        return replace(frame, depth=frame.depth * float(unit), depth_unit=None)
+    return replace(frame, depth_unit=float(unit))
+
+
+def _with_camera(frame: Frame, given: tuple[Camera, ...]) -> Frame:
+    size = _size(frame)
+    camera = frame.camera if not given or size is None else _of_size(given, size, frame.source)
+    if camera is None or size is None:
+        return frame
+    if (camera.width, camera.height) != size:
+        raise InputError(
+            f"{frame.source}: the frame is {size[0]} x {size[1]} pixels but the camera "
+            f"{camera.width} x {camera.height}; give the camera of this stream with --camera"
+        )
+    origin = {"camera_from": "given"} if given else {}
+    return replace(frame, camera=camera, provenance={**frame.provenance, **origin})
+
+
+def _size(frame: Frame) -> tuple[int, int] | None:
+    """Width and height in pixels; None for points in no order."""
+    if frame.depth is not None:
+        return frame.depth.shape[1], frame.depth.shape[0]
+    if frame.points is not None and frame.points.ndim == 3:
+        return frame.points.shape[1], frame.points.shape[0]
+    return None
+
+
+def _of_size(cameras: tuple[Camera, ...], size: tuple[int, int], source: str) -> Camera:
+    fitting = [camera for camera in cameras if (camera.width, camera.height) == size]
+    if len(fitting) > 1:
+        raise InputError(f"{source}: the camera file has {len(fitting)} different cameras of this size; keep the one")
+    if fitting:
+        return fitting[0]
+    if len(cameras) == 1:
+        return cameras[0]
+    known = ", ".join(f"{camera.width} x {camera.height}" for camera in cameras)
+    raise InputError(f"{source}: the frame is {size[0]} x {size[1]} pixels, the camera file has {known}")
+
+
+def _z_from_ray_length(frame: Frame) -> Frame:
+    """Depth z = length / |(x/z, y/z, 1)| of the pixel's ray."""
+    if frame.depth is None:
+        raise InputError(f"{frame.source}: points have no ray length; leave --ray-length out")
+    if frame.camera is None:
+        raise InputError(f"{frame.source}: ray lengths need the camera to become z; give --camera")
+    stretch = np.sqrt(1.0 + np.sum(frame.camera.rays() ** 2, axis=2))
+    metres = np.where(frame.depth == 65535, 0, frame.depth) if frame.depth.dtype == np.uint16 else frame.depth
+    depth = metres * (frame.depth_unit or 1.0) / stretch
+    return replace(frame, depth=depth, depth_unit=None, provenance={**frame.provenance, "ray_length": True})

@@ -1,0 +1,96 @@
+"""What every source of frames promises: order, laziness, damage told, the user's word above the file's."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import siloscope.frames
+from siloscope import Camera, InputError, UsageError
+
+RAW = np.random.default_rng(1).integers(400, 6000, (48, 64), dtype=np.uint16)
+CAMERA = Camera(64, 48, 57.0, 57.0, 31.5, 23.5)
+
+
+@pytest.fixture
+def png(tmp_path: Path) -> Path:
+    path = tmp_path / "depth.png"
+    Image.fromarray(RAW).save(path)
+    return path
+
+
+def test_a_png_gives_its_raw_units(png: Path) -> None:
+    with siloscope.frames.open(png, camera=CAMERA, depth_unit=0.00025) as source:
+        (frame,) = source
+    assert frame.depth is not None
+    assert frame.depth.dtype == np.uint16
+    assert np.array_equal(frame.depth, RAW)
+    assert (frame.depth_unit, frame.camera) == (0.00025, CAMERA)
+    assert frame.provenance["depth_unit_from"] == "given"
+
+
+def test_a_missing_unit_is_asked_for(png: Path) -> None:
+    with pytest.raises(InputError, match="--depth-unit"):
+        list(siloscope.frames.open(png))
+
+
+def test_a_camera_of_another_size_is_refused(png: Path) -> None:
+    other = Camera(640, 480, 570.0, 570.0, 319.5, 239.5)
+    with pytest.raises(InputError, match="64 x 48 pixels but the camera 640 x 480"):
+        list(siloscope.frames.open(png, camera=other, depth_unit=0.001))
+
+
+def test_content_decides_not_the_name(png: Path) -> None:
+    renamed = png.rename(png.with_suffix(".npy"))
+    assert siloscope.frames.sniff(renamed).name == "png"
+
+
+def test_one_damaged_file_of_several_is_told_and_skipped(png: Path) -> None:
+    cut = png.with_name("cut.png")
+    cut.write_bytes(png.read_bytes()[:-400])
+    missing = png.with_name("missing.png")
+    source = siloscope.frames.open([png, cut, missing, png], depth_unit=0.001)
+    assert len(source) == 4
+    frames = list(source)
+    assert len(frames) == 2
+    assert len(source.problems) == 2
+    assert "cut.png" in source.problems[0]
+    assert "missing.png: no such file" in source.problems[1]
+
+
+def test_nothing_readable_is_an_error(png: Path) -> None:
+    png.write_bytes(png.read_bytes()[:-400])
+    with pytest.raises(InputError, match=r"depth\.png: damaged PNG"):
+        list(siloscope.frames.open(png, depth_unit=0.001))
+
+
+@pytest.mark.parametrize("unit", [0.0, -1.0, float("nan"), float("inf"), 1000.0])
+def test_impossible_units_are_refused(png: Path, unit: float) -> None:
+    with pytest.raises(UsageError, match="depth unit"):
+        siloscope.frames.open(png, depth_unit=unit)
+
+
+def test_unknown_content_is_named(tmp_path: Path) -> None:
+    path = tmp_path / "depth.png"
+    path.write_bytes(b"\x00\x01\x02 nothing known")
+    with pytest.raises(InputError, match=r"depth\.png: content starting with .* png"):
+        siloscope.frames.open(path)
+
+
+def test_float_depth_that_looks_like_millimetres_is_not_taken_for_metres(tmp_path: Path) -> None:
+    np.save(tmp_path / "mm.npy", RAW.astype(np.float32))
+    with pytest.raises(InputError, match=r"0\.001 for millimetres"):
+        list(siloscope.frames.open(tmp_path / "mm.npy"))
+    (frame,) = siloscope.frames.open(tmp_path / "mm.npy", depth_unit=0.001)
+    assert np.allclose(frame.depth, RAW * 0.001)
+
+
+def test_ray_length_becomes_z(tmp_path: Path) -> None:
+    z = np.full((48, 64), 2.0)
+    length = z * np.sqrt(1 + np.sum(CAMERA.rays() ** 2, axis=2))
+    np.save(tmp_path / "length.npy", length)
+    (frame,) = siloscope.frames.open(tmp_path / "length.npy", camera=CAMERA, ray_length=True)
+    assert np.allclose(frame.depth, z, rtol=0, atol=1e-12)
