@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 mod camera;
 mod convert;
 mod files;
+mod scene;
 
 /// The compiled core of siloscope.
 #[pymodule]
@@ -12,5 +13,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     camera::register(m)?;
     files::register(m)?;
+    scene::register(m)?;
     Ok(())
 }

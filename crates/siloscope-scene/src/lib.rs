@@ -1,1 +1,28 @@
 //! Ray-casts depth frames of silos with exact truth.
+//!
+//! The synthetic world of section 2.4: a silo with feed in it ([`SiloWorld`]) is seen by a camera ([`render`]), and a
+//! sensor model ([`Sensor`]) spoils the exact depths. Rays hit surfaces to the accuracy of float64; noise is drawn by
+//! pixel number, so that it does not depend on the number of threads.
+
+pub mod feed;
+pub mod random;
+pub mod render;
+pub mod root;
+pub mod sensor;
+pub mod silo;
+pub mod volume;
+pub mod world;
+
+pub use feed::{Feed, Lumps, Rathole};
+pub use render::{Exact, render};
+pub use sensor::Sensor;
+pub use silo::Silo;
+pub use volume::Content;
+pub use world::{Hit, Label, SiloWorld, World};
+
+use siloscope::{Error, Result};
+
+/// Refuses a number outside its bounds by the name the user gave it.
+pub(crate) fn bounded(name: &'static str, value: f64, low: f64, high: f64, bounds: &'static str) -> Result<()> {
+    if (low..=high).contains(&value) { Ok(()) } else { Err(Error::Setting { name, bounds, value }) }
+}

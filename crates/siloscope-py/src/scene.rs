@@ -1,0 +1,232 @@
+//! Synthetic scenes and their measures.
+
+use crate::convert;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+use siloscope_scene::feed::{Base, Lumps, Shape};
+use siloscope_scene::{Exact, Feed, Rathole, Sensor, Silo, SiloWorld, World};
+
+type Frame<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyArray2<f64>>);
+type Reading<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<bool>>);
+type Laws<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
+
+/// Exact depth (H*W,), labels (H*W,) and normals (H*W, 3) of a `siloscope.scene.Scene`.
+#[pyfunction]
+fn render_scene<'py>(py: Python<'py>, scene: &Bound<'py, PyAny>, threads: usize) -> PyResult<Frame<'py>> {
+    let world = world(scene)?;
+    let camera = convert::camera(&scene.getattr("camera")?)?;
+    let pose = pose(&scene.getattr("pose")?)?;
+    let exact = py.detach(|| siloscope_scene::render(world.as_ref(), &camera, &pose, threads));
+    let Exact { depth, labels, normals } = exact.map_err(convert::value_error)?;
+    let count = normals.len();
+    let normals = PyArray1::from_vec(py, normals.into_iter().flatten().collect()).reshape([count, 3])?;
+    Ok((PyArray1::from_vec(py, depth), PyArray1::from_vec(py, labels), normals))
+}
+
+/// Depth (H*W,) as a `siloscope.scene.SensorModel` gives it, and which pixels are false returns.
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn measure_depth<'py>(
+    py: Python<'py>,
+    sensor: &Bound<'py, PyAny>,
+    camera: &Bound<'py, PyAny>,
+    depth: PyReadonlyArray1<'py, f64>,
+    labels: PyReadonlyArray1<'py, u8>,
+    normals: PyReadonlyArray2<'py, f64>,
+    seed: u64,
+    threads: usize,
+) -> PyResult<Reading<'py>> {
+    let sensor = self::sensor(sensor)?;
+    let camera = convert::camera(camera)?;
+    let normals = normals.as_array();
+    if normals.ncols() != 3 || normals.nrows() != depth.as_array().len() {
+        return Err(convert::value_error("normals must have the shape (number of depths, 3)"));
+    }
+    let exact = Exact {
+        depth: depth.as_array().to_vec(),
+        labels: labels.as_array().to_vec(),
+        normals: normals.rows().into_iter().map(|n| [n[0], n[1], n[2]]).collect(),
+    };
+    let measured = py.detach(|| sensor.measure(&exact, &camera, seed, threads)).map_err(convert::value_error)?;
+    Ok((PyArray1::from_vec(py, measured.depth), PyArray1::from_vec(py, measured.false_returns)))
+}
+
+/// Bias and standard deviation (metres) of a sensor model at true depths.
+#[pyfunction]
+fn sensor_laws<'py>(
+    py: Python<'py>,
+    sensor: &Bound<'py, PyAny>,
+    depth: PyReadonlyArray1<'py, f64>,
+) -> PyResult<Laws<'py>> {
+    let sensor = self::sensor(sensor)?;
+    sensor.validate().map_err(convert::value_error)?;
+    let (bias, sigma) = depth.as_array().iter().map(|&d| (sensor.bias_at(d), sensor.sigma_at(d))).unzip();
+    Ok((PyArray1::from_vec(py, bias), PyArray1::from_vec(py, sigma)))
+}
+
+/// Volume, surface area seen from above, and mean, highest and lowest height of a scene's feed; None without feed.
+#[pyfunction]
+fn feed_content(py: Python<'_>, silo: &Bound<'_, PyAny>, feed: &Bound<'_, PyAny>) -> PyResult<Option<[f64; 5]>> {
+    let silo = self::silo(silo)?;
+    let Some(feed) = self::feed(feed, &silo)? else { return Ok(None) };
+    let c = py.detach(|| siloscope_scene::volume::content(&feed));
+    Ok(Some([c.volume, c.area, c.mean_height, c.max_height, c.min_height]))
+}
+
+/// Heights of the feed surface over the vertex at places (N, 2); NaN where the cone lies higher or outside the silo.
+#[pyfunction]
+fn feed_heights<'py>(
+    py: Python<'py>,
+    silo: &Bound<'py, PyAny>,
+    feed: &Bound<'py, PyAny>,
+    places: PyReadonlyArray2<'py, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let silo = self::silo(silo)?;
+    let feed = self::feed(feed, &silo)?;
+    if places.as_array().ncols() != 2 {
+        return Err(convert::value_error("places must have the shape (number of places, 2)"));
+    }
+    let wall = |r: f64| if r <= silo.radius { silo.cone_height * r / silo.radius } else { f64::INFINITY };
+    let height = |x: f64, y: f64| {
+        let surface = feed.as_ref().map_or(f64::NAN, |feed| feed.height(x, y));
+        if surface > wall(x.hypot(y)) { surface } else { f64::NAN }
+    };
+    let heights = places.as_array().rows().into_iter().map(|p| height(p[0], p[1])).collect();
+    Ok(PyArray1::from_vec(py, heights))
+}
+
+/// Raises `ValueError` naming the field where a silo or its feed can't be.
+#[pyfunction]
+fn check_silo(silo: &Bound<'_, PyAny>) -> PyResult<()> {
+    self::silo(silo).map(|_| ())
+}
+
+/// Raises `ValueError` naming the field where a sensor model can't be used.
+#[pyfunction]
+fn check_sensor(sensor: &Bound<'_, PyAny>) -> PyResult<()> {
+    self::sensor(sensor)?.validate().map_err(convert::value_error)
+}
+
+fn number(object: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    object.getattr(name)?.extract().map_err(|_| convert::value_error(format!("{name} must be a number")))
+}
+
+fn numbers<const N: usize>(object: &Bound<'_, PyAny>, name: &str) -> PyResult<[f64; N]> {
+    object.getattr(name)?.extract().map_err(|_| convert::value_error(format!("{name} must be {N} numbers")))
+}
+
+fn pose(object: &Bound<'_, PyAny>) -> PyResult<siloscope::SiloPose> {
+    Ok(siloscope::SiloPose {
+        r_x: number(object, "r_x")?,
+        r_y: number(object, "r_y")?,
+        t_x: number(object, "t_x")?,
+        t_y: number(object, "t_y")?,
+    })
+}
+
+fn world(scene: &Bound<'_, PyAny>) -> PyResult<Box<dyn World>> {
+    let silo = silo(&scene.getattr("silo")?)?;
+    let feed = feed(&scene.getattr("feed")?, &silo)?;
+    Ok(Box::new(SiloWorld { silo, feed }))
+}
+
+fn silo(object: &Bound<'_, PyAny>) -> PyResult<Silo> {
+    let silo = Silo {
+        radius: number(object, "radius")?,
+        cylinder_height: number(object, "cylinder_height")?,
+        cone_height: number(object, "cone_height")?,
+        top: number(object, "top")?,
+        roof: object.getattr("roof")?.extract()?,
+        outlet_radius: number(object, "outlet_radius")?,
+        outlet_length: number(object, "outlet_length")?,
+        outlet_offset: numbers(object, "outlet_offset")?,
+    };
+    silo.validate().map_err(convert::value_error)?;
+    Ok(silo)
+}
+
+/// Reads a `siloscope.scene.Feed`; its `resolved` numbers have no None left.
+fn feed(object: &Bound<'_, PyAny>, silo: &Silo) -> PyResult<Option<Feed>> {
+    if object.is_none() {
+        return Ok(None);
+    }
+    let plan = object.call_method1("resolved", (silo.radius,))?;
+    let base: String = plan.getattr("base")?.extract()?;
+    let tangent = slope(&plan, "angle")?;
+    let shape = Shape {
+        radius: silo.radius,
+        base: match base.as_str() {
+            "gaussian" => Base::Gaussian,
+            "funnel" => Base::Conical(tangent, number(&plan, "tip")?),
+            "mound" => Base::Conical(-tangent, number(&plan, "tip")?),
+            _ => Base::Flat,
+        },
+        centre: numbers(&plan, "centre")?,
+        tilt: tilt(slope(&plan, "tilt")?, number(&plan, "tilt_azimuth")?),
+        lumps: lumps(&plan, silo.radius)?,
+        ratholes: ratholes(&plan)?,
+    };
+    Feed::fill(silo, shape, number(&plan, "level")?).map(Some).map_err(convert::value_error)
+}
+
+/// Tangent of an angle between horizontal and nearly vertical.
+fn slope(plan: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
+    let angle = number(plan, name)?;
+    if (0.0..=1.47).contains(&angle) {
+        return Ok(angle.tan());
+    }
+    Err(convert::value_error(format!("{name} must be between 0 and 1.47 rad, got {angle}")))
+}
+
+fn tilt(slope: f64, azimuth: f64) -> [f64; 2] {
+    [slope * azimuth.cos(), slope * azimuth.sin()]
+}
+
+fn lumps(plan: &Bound<'_, PyAny>, radius: f64) -> PyResult<Option<Lumps>> {
+    let height = number(plan, "lump_height")?;
+    if height == 0.0 {
+        return Ok(None);
+    }
+    let seed = plan.getattr("seed")?.extract()?;
+    Lumps::new(height, number(plan, "lump_size")?, radius, seed).map(Some).map_err(convert::value_error)
+}
+
+fn ratholes(plan: &Bound<'_, PyAny>) -> PyResult<Vec<Rathole>> {
+    let hole = Rathole {
+        centre: numbers(plan, "rathole_centre")?,
+        radius: number(plan, "rathole_radius")?,
+        depth: number(plan, "rathole_depth")?,
+    };
+    Ok(if hole.depth == 0.0 { vec![] } else { vec![hole] })
+}
+
+fn sensor(object: &Bound<'_, PyAny>) -> PyResult<Sensor> {
+    Ok(Sensor {
+        bias: numbers(object, "bias")?,
+        noise: numbers(object, "noise")?,
+        noise_scale: number(object, "noise_scale")?,
+        noise_power: number(object, "noise_power")?,
+        noise_floor: number(object, "noise_floor")?,
+        incidence_gain: number(object, "incidence_gain")?,
+        correlation: number(object, "correlation")?,
+        correlation_length: number(object, "correlation_length")?,
+        min_range: number(object, "min_range")?,
+        max_range: number(object, "max_range")?,
+        max_incidence: number(object, "max_incidence")?,
+        dropout: number(object, "dropout")?,
+        flying: number(object, "flying")?,
+        flying_step: number(object, "flying_step")?,
+        dust: number(object, "dust")?,
+        unit: number(object, "unit")?,
+    })
+}
+
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(render_scene, m)?)?;
+    m.add_function(wrap_pyfunction!(measure_depth, m)?)?;
+    m.add_function(wrap_pyfunction!(sensor_laws, m)?)?;
+    m.add_function(wrap_pyfunction!(feed_content, m)?)?;
+    m.add_function(wrap_pyfunction!(feed_heights, m)?)?;
+    m.add_function(wrap_pyfunction!(check_silo, m)?)?;
+    m.add_function(wrap_pyfunction!(check_sensor, m)?)
+}

@@ -1,0 +1,291 @@
+//! The sensor: what it makes of exact depths (Eqs. 8–10, and more general laws).
+
+use crate::bounded;
+use crate::feed::spline;
+use crate::random::Stream;
+use crate::render::{Exact, check_threads};
+use siloscope::{Camera, Error, Result};
+
+/// Error model of a depth sensor. Lengths in metres, angles in radians.
+///
+/// A pixel's depth is `true + bias(true) + sigma(true) · normal` (Eq. 10), then cut to the range and rounded to `unit`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Sensor {
+    /// Bias `b0 + b1 d + b2 d²` (Eq. 8 has all three).
+    pub bias: [f64; 3],
+    /// Standard deviation `n0 + n1 d + n2 d²` (Eq. 9 has all three), plus the power law.
+    pub noise: [f64; 3],
+    /// Power law `scale · d^power` added to the standard deviation; stereo: `s/(fx·B)` and 2.
+    pub noise_scale: f64,
+    /// Exponent of the power law.
+    pub noise_power: f64,
+    /// Least standard deviation.
+    pub noise_floor: f64,
+    /// The standard deviation grows by the factor `1 + gain·(θ/(π/2 - θ))²` at incidence angle θ.
+    pub incidence_gain: f64,
+    /// Share of the variance that neighbouring pixels have in common.
+    pub correlation: f64,
+    /// Reach of that common part, pixels.
+    pub correlation_length: f64,
+    /// Nearest depth measured.
+    pub min_range: f64,
+    /// Farthest depth measured; infinite for no limit.
+    pub max_range: f64,
+    /// Surfaces met at a larger incidence angle give no measurement; π/2 for no limit.
+    pub max_incidence: f64,
+    /// Share of pixels that give no measurement for no visible reason.
+    pub dropout: f64,
+    /// Share of pixels at depth edges that read a depth between the two sides.
+    pub flying: f64,
+    /// Relative depth step that makes an edge.
+    pub flying_step: f64,
+    /// Share of pixels that read a dust grain somewhere before the surface.
+    pub dust: f64,
+    /// Metres a raw unit; 0 for unrounded depths.
+    pub unit: f64,
+}
+
+impl Default for Sensor {
+    /// A perfect sensor.
+    fn default() -> Self {
+        Self {
+            bias: [0.0; 3],
+            noise: [0.0; 3],
+            noise_scale: 0.0,
+            noise_power: 2.0,
+            noise_floor: 0.0,
+            incidence_gain: 0.0,
+            correlation: 0.0,
+            correlation_length: 8.0,
+            min_range: 0.0,
+            max_range: f64::INFINITY,
+            max_incidence: std::f64::consts::FRAC_PI_2,
+            dropout: 0.0,
+            flying: 0.0,
+            flying_step: 0.03,
+            dust: 0.0,
+            unit: 0.0,
+        }
+    }
+}
+
+/// A pixel after the sensor: its depth (0 for none) and whether it shows something that is not there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Reading {
+    depth: f64,
+    false_return: bool,
+}
+
+const NO_READING: Reading = Reading { depth: 0.0, false_return: false };
+
+/// Depths as the sensor gives them, and which pixels are flying or dust.
+#[derive(Debug, Clone)]
+pub struct Measured {
+    /// Depth, 0 where there is none.
+    pub depth: Vec<f64>,
+    /// Flying pixels and dust.
+    pub false_returns: Vec<bool>,
+}
+
+impl Sensor {
+    /// Checks every field by its name.
+    pub fn validate(&self) -> Result<()> {
+        for (name, three) in [("bias", self.bias), ("noise", self.noise)] {
+            three.iter().try_for_each(|&x| bounded(name, x, -1e3, 1e3, "finite numbers between -1000 and 1000"))?;
+        }
+        bounded("noise_scale", self.noise_scale, 0.0, 1e3, "between 0 and 1000")?;
+        bounded("noise_power", self.noise_power, 0.0, 10.0, "between 0 and 10")?;
+        bounded("noise_floor", self.noise_floor, 0.0, 1e3, "between 0 and 1000 m")?;
+        bounded("incidence_gain", self.incidence_gain, 0.0, 1e3, "between 0 and 1000")?;
+        bounded("correlation_length", self.correlation_length, 1.0, 1e4, "between 1 and 10000 pixels")?;
+        bounded("min_range", self.min_range, 0.0, 1e3, "between 0 and 1000 m")?;
+        bounded("max_range", self.max_range, self.min_range, f64::INFINITY, "at least min_range")?;
+        let right = std::f64::consts::FRAC_PI_2;
+        bounded("max_incidence", self.max_incidence, 0.0, right + 1e-9, "between 0 and π/2 rad")?;
+        bounded("flying_step", self.flying_step, 1e-6, 1e3, "between 0.000001 and 1000")?;
+        bounded("unit", self.unit, 0.0, 1.0, "between 0 and 1 m")?;
+        let shares = [
+            ("correlation", self.correlation),
+            ("dropout", self.dropout),
+            ("flying", self.flying),
+            ("dust", self.dust),
+        ];
+        shares.iter().try_for_each(|&(name, share)| bounded(name, share, 0.0, 1.0, "a share between 0 and 1"))
+    }
+
+    /// Mean of the error at a true depth (Eq. 8 for the Astra S).
+    pub fn bias_at(&self, d: f64) -> f64 {
+        self.bias[0] + d * (self.bias[1] + d * self.bias[2])
+    }
+
+    /// Standard deviation of the error at a true depth, at perpendicular incidence (Eq. 9 for the Astra S).
+    pub fn sigma_at(&self, d: f64) -> f64 {
+        let power = if self.noise_scale > 0.0 { self.noise_scale * d.powf(self.noise_power) } else { 0.0 };
+        (self.noise[0] + d * (self.noise[1] + d * self.noise[2]) + power).max(self.noise_floor)
+    }
+
+    /// Measures an exact frame. The same seed gives the same noise, whatever the number of threads.
+    pub fn measure(&self, exact: &Exact, camera: &Camera, seed: u64, threads: usize) -> Result<Measured> {
+        self.validate()?;
+        check_threads(threads)?;
+        let pixels = camera.width * camera.height;
+        if exact.depth.len() != pixels {
+            return Err(Error::Shape { what: "depth", got: exact.depth.len(), expected: pixels });
+        }
+        let mut out = Measured { depth: vec![0.0; pixels], false_returns: vec![false; pixels] };
+        let band = camera.height.div_ceil(threads) * camera.width;
+        let pass = Pass { sensor: self, exact, camera, seed };
+        std::thread::scope(|scope| {
+            for (part, (depth, flags)) in out.depth.chunks_mut(band).zip(out.false_returns.chunks_mut(band)).enumerate()
+            {
+                let mut job = move || pass.read_band(part * band, depth, flags);
+                if threads == 1 { job() } else { drop(scope.spawn(job)) }
+            }
+        });
+        Ok(out)
+    }
+}
+
+/// One frame through one sensor.
+#[derive(Clone, Copy)]
+struct Pass<'a> {
+    sensor: &'a Sensor,
+    exact: &'a Exact,
+    camera: &'a Camera,
+    seed: u64,
+}
+
+/// What the random streams are for.
+#[derive(Clone, Copy)]
+enum Purpose {
+    Noise = 16,
+    Common,
+    Dropout,
+    Flying,
+    FlyingDepth,
+    Dust,
+    DustDepth,
+}
+
+impl Pass<'_> {
+    fn stream(&self, purpose: Purpose) -> Stream {
+        Stream::new(self.seed, purpose as u64)
+    }
+
+    fn read_band(&self, first: usize, depth: &mut [f64], flags: &mut [bool]) {
+        for (i, (depth, flag)) in depth.iter_mut().zip(flags).enumerate() {
+            let reading = self.read(first + i);
+            (*depth, *flag) = (reading.depth, reading.false_return);
+        }
+    }
+
+    fn read(&self, pixel: usize) -> Reading {
+        let sensor = self.sensor;
+        let surface = self.exact.depth[pixel];
+        let (true_depth, false_return) = match self.false_return(pixel, surface) {
+            Some(depth) => (depth, true),
+            None => (surface, false),
+        };
+        if true_depth <= 0.0 || self.happens(Purpose::Dropout, sensor.dropout, pixel) {
+            return NO_READING;
+        }
+        let angle = if false_return { 0.0 } else { self.incidence(pixel) };
+        if angle > sensor.max_incidence {
+            return NO_READING;
+        }
+        let depth = self.disturbed(pixel, true_depth, angle);
+        if !(depth > 0.0 && (sensor.min_range..=sensor.max_range).contains(&depth)) {
+            return NO_READING;
+        }
+        Reading { depth: self.rounded(depth), false_return }
+    }
+
+    /// Eq. 10: the true depth plus its error.
+    fn disturbed(&self, pixel: usize, d: f64, angle: f64) -> f64 {
+        let sensor = self.sensor;
+        let sigma = sensor.sigma_at(d);
+        let noise = if sigma > 0.0 { sigma * self.grazing_factor(angle) * self.unit_noise(pixel) } else { 0.0 };
+        d + sensor.bias_at(d) + noise
+    }
+
+    fn grazing_factor(&self, angle: f64) -> f64 {
+        if self.sensor.incidence_gain == 0.0 {
+            return 1.0;
+        }
+        let ratio = angle / (std::f64::consts::FRAC_PI_2 - angle).max(0.02);
+        1.0 + self.sensor.incidence_gain * ratio * ratio
+    }
+
+    /// Noise of variance 1: a part of its own and a part shared with the neighbours.
+    fn unit_noise(&self, pixel: usize) -> f64 {
+        let own = self.stream(Purpose::Noise).normal(pixel as u64);
+        let share = self.sensor.correlation;
+        if share == 0.0 { own } else { (1.0 - share).sqrt() * own + share.sqrt() * self.common_noise(pixel) }
+    }
+
+    /// A B-spline over random values on a coarse lattice, scaled to variance 1 at every pixel.
+    fn common_noise(&self, pixel: usize) -> f64 {
+        let pitch = self.sensor.correlation_length;
+        let (u, v) = ((pixel % self.camera.width) as f64 / pitch, (pixel / self.camera.width) as f64 / pitch);
+        let (wx, wy) = (spline(u.fract()), spline(v.fract()));
+        let stream = self.stream(Purpose::Common);
+        let (mut sum, mut power) = (0.0, 0.0);
+        for (j, wy) in wy.iter().enumerate() {
+            for (i, wx) in wx.iter().enumerate() {
+                let site = ((v as u64 + j as u64) << 32) | (u as u64 + i as u64);
+                sum += wx * wy * stream.normal(site);
+                power += wx * wy * wx * wy;
+            }
+        }
+        sum / power.sqrt()
+    }
+
+    /// Depth of a dust grain or of a flying pixel, where there is one.
+    fn false_return(&self, pixel: usize, surface: f64) -> Option<f64> {
+        if self.happens(Purpose::Dust, self.sensor.dust, pixel) {
+            let near = self.sensor.min_range.max(0.05);
+            let far = if surface > 0.0 { surface } else { 10.0 };
+            let u = self.stream(Purpose::DustDepth).uniform(pixel as u64);
+            return (far > near).then_some(near + (far - near) * u * u); // dense near the sensor
+        }
+        if surface > 0.0 && self.happens(Purpose::Flying, self.sensor.flying, pixel) {
+            let far = self.across_edge(pixel, surface)?;
+            return Some(surface + (far - surface) * self.stream(Purpose::FlyingDepth).uniform(pixel as u64));
+        }
+        None
+    }
+
+    /// The depth of the 4-neighbour that lies across a depth edge.
+    fn across_edge(&self, pixel: usize, depth: f64) -> Option<f64> {
+        let (width, column) = (self.camera.width, pixel % self.camera.width);
+        let left = (column > 0).then(|| pixel - 1);
+        let right = (column + 1 < width).then_some(pixel + 1);
+        let neighbours = [left, right, pixel.checked_sub(width), Some(pixel + width)];
+        let depths = neighbours.into_iter().flatten().filter_map(|i| self.exact.depth.get(i).copied());
+        depths.filter(|&d| d > 0.0).find(|d| (d - depth).abs() > self.sensor.flying_step * d.min(depth))
+    }
+
+    /// Angle between the ray and the surface's normal.
+    fn incidence(&self, pixel: usize) -> f64 {
+        if self.sensor.incidence_gain == 0.0 && self.sensor.max_incidence >= std::f64::consts::FRAC_PI_2 {
+            return 0.0;
+        }
+        let [x, y] = self.camera.ray((pixel % self.camera.width) as f64, (pixel / self.camera.width) as f64);
+        let n = self.exact.normals[pixel];
+        let cosine = (n[0] * x + n[1] * y + n[2]).abs() / (x * x + y * y + 1.0).sqrt();
+        cosine.min(1.0).acos()
+    }
+
+    fn happens(&self, purpose: Purpose, share: f64, pixel: usize) -> bool {
+        share > 0.0 && self.stream(purpose).uniform(pixel as u64) < share
+    }
+
+    /// The depth in whole raw units; what does not fit into 16 bits is lost.
+    fn rounded(&self, depth: f64) -> f64 {
+        if self.sensor.unit == 0.0 {
+            return depth;
+        }
+        let raw = (depth / self.sensor.unit).round();
+        if (1.0..65535.0).contains(&raw) { raw * self.sensor.unit } else { 0.0 }
+    }
+}

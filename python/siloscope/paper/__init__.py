@@ -1,0 +1,1 @@
+"""The paper's scenarios, measures, tables and figures."""
