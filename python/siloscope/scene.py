@@ -16,13 +16,11 @@ from siloscope.camera import Camera
 from siloscope.errors import UsageError
 from siloscope.estimate import Ratios, SiloGeometry
 from siloscope.frame import Frame
+from siloscope.paper import metrics
 from siloscope.pose import SiloPose
 
 ASTRA = Camera(width=640, height=480, fx=570.3, fy=570.3, cx=319.5, cy=239.5)
 """The Orbbec Astra as the reconstructed scenarios use it."""
-
-LABELS = {"none": 0, "cylinder": 1, "cone": 2, "feed": 3, "other": 4}
-"""Numbers in label images; "other" is outlet, roof, clutter, flying pixel or dust."""
 
 BASES = ("gaussian", "funnel", "mound", "flat")
 """Feed shapes that stand alone."""
@@ -361,7 +359,7 @@ class SimulatedFrame:
     depth : float64
         Exact depth z, 0 where nothing is hit.
     labels : uint8
-        What each pixel shows (`LABELS`).
+        What each pixel shows (`siloscope.paper.metrics.LABELS`).
     normals : float64 (H, W, 3)
         Unit normals towards the camera; 0 where nothing is hit.
     measured : float64
@@ -390,7 +388,7 @@ class SimulatedFrame:
     @property
     def measured_labels(self) -> NDArray[np.uint8]:
         """Labels of what was measured: 0 where nothing was, 4 for false returns."""
-        labels = np.where(self.false_returns, np.uint8(LABELS["other"]), self.labels)
+        labels = np.where(self.false_returns, np.uint8(metrics.LABELS["other"]), self.labels)
         return np.where(self.measured > 0, labels, np.uint8(0))
 
     @cached_property
@@ -411,13 +409,12 @@ class SimulatedFrame:
     @property
     def pixel_ratios(self) -> Ratios:
         """Shares of cylinder, cone and feed among the pixels with depth (section 2.4.4)."""
-        return _ratios(np.bincount(self.measured_labels.ravel(), minlength=5))
+        return metrics.pixel_ratios(self.measured_labels)
 
     @property
     def area_ratios(self) -> Ratios:
         """The same shares by true surface area."""
-        areas = pixel_areas(self.depth, self.normals, self.camera)
-        return _ratios(np.bincount(self.measured_labels.ravel(), areas.ravel(), minlength=5))
+        return metrics.area_ratios(self.measured_labels, self.depth, self.normals, self.camera)
 
     def raw(self, unit: float | None = None) -> NDArray[np.uint16]:
         """Measured depth in raw units of `unit` metres (default: the sensor's, else 1 mm); 0 where there is none."""
@@ -444,35 +441,6 @@ class SimulatedFrame:
             "fill_fraction": self.fill_fraction,
             "ratios": {"pixels": self.pixel_ratios.to_dict(), "area": self.area_ratios.to_dict()},
         }
-
-
-def _ratios(sums: NDArray[Any]) -> Ratios:
-    total = float(sums[1:].sum()) or 1.0
-    return Ratios(*(float(sums[LABELS[name]]) / total for name in ("cylinder", "cone", "feed")))
-
-
-def pixel_areas(depth: NDArray[np.float64], normals: NDArray[np.float64], camera: Camera) -> NDArray[np.float64]:
-    """Surface area that each pixel sees, m², (H, W); 0 where nothing is hit.
-
-    The ray is q = (x, y, 1) and its pixel in the plane z = 1 has the area J, 1/(fx fy) for an undistorted camera.
-    Seen from the camera it fills the solid angle J/|q|³; the surface at distance d|q| under the angle of cosine
-    |n·q|/|q| then has d² J / |n·q|.
-    """
-    x, y = camera.rays()[..., 0], camera.rays()[..., 1]
-    facing = np.abs(normals[..., 0] * x + normals[..., 1] * y + normals[..., 2])
-    seen = facing > 0
-    areas: NDArray[np.float64] = np.divide(depth**2 * _cell_areas(camera), facing, out=np.zeros_like(depth), where=seen)
-    return areas
-
-
-def _cell_areas(camera: Camera) -> float | NDArray[np.float64]:
-    """Area of each pixel's cell in the plane z = 1."""
-    if camera.distortion_model == "none" or min(camera.width, camera.height) < 2:
-        return 1.0 / (camera.fx * camera.fy)
-    rays = camera.rays()
-    along_v, along_u = np.gradient(rays, axis=0), np.gradient(rays, axis=1)
-    cells: NDArray[np.float64] = np.abs(along_u[..., 0] * along_v[..., 1] - along_u[..., 1] * along_v[..., 0])
-    return cells
 
 
 def discharge(scene: Scene, steps: int, highest: float = 0.9, lowest: float = 0.0) -> Iterator[Scene]:

@@ -107,6 +107,28 @@ fn check_sensor(sensor: &Bound<'_, PyAny>) -> PyResult<()> {
     self::sensor(sensor)?.validate().map_err(convert::value_error)
 }
 
+/// Distance (N,) from each query (N, 3) to the nearest reference point (M, 3).
+#[pyfunction]
+#[pyo3(signature = (queries, reference, threads=1))]
+fn nearest_distances<'py>(
+    py: Python<'py>,
+    queries: PyReadonlyArray2<'py, f64>,
+    reference: PyReadonlyArray2<'py, f64>,
+    threads: usize,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let (queries, reference) = (points(&queries)?, points(&reference)?);
+    let distances = py.detach(|| siloscope::nearest_distances(&queries, &reference, threads));
+    Ok(PyArray1::from_vec(py, distances.map_err(convert::value_error)?))
+}
+
+fn points(array: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<[f64; 3]>> {
+    let array = array.as_array();
+    if array.ncols() != 3 {
+        return Err(convert::value_error(format!("points must have the shape (N, 3), got {:?}", array.shape())));
+    }
+    Ok(array.rows().into_iter().map(|p| [p[0], p[1], p[2]]).collect())
+}
+
 fn number(object: &Bound<'_, PyAny>, name: &str) -> PyResult<f64> {
     object.getattr(name)?.extract().map_err(|_| convert::value_error(format!("{name} must be a number")))
 }
@@ -227,6 +249,7 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(sensor_laws, m)?)?;
     m.add_function(wrap_pyfunction!(feed_content, m)?)?;
     m.add_function(wrap_pyfunction!(feed_heights, m)?)?;
+    m.add_function(wrap_pyfunction!(nearest_distances, m)?)?;
     m.add_function(wrap_pyfunction!(check_silo, m)?)?;
     m.add_function(wrap_pyfunction!(check_sensor, m)?)
 }

@@ -6,10 +6,12 @@
 
 pub mod camera;
 pub mod error;
+pub mod nearest;
 pub mod pose;
 
 pub use camera::{Camera, Distortion};
 pub use error::{Error, Result};
+pub use nearest::nearest_distances;
 pub use pose::SiloPose;
 
 /// A point or direction in three dimensions, in metres where it is a point.
