@@ -23,6 +23,8 @@ _MODULES = (
     # Own magic bytes first, plain text last.
     "png",
     "npy",
+    "ply",
+    "pcd",
 )
 """One module a format, in the order they are asked; each has a `Format` named ``FORMAT``."""
 

@@ -10,7 +10,7 @@ from typing import Any
 from siloscope import _core
 from siloscope.errors import InputError
 from siloscope.frame import Frame
-from siloscope.frames.source import Format, FrameSource, Item, Options, check_image_size
+from siloscope.frames.source import Format, FrameSource, Item, Options, check_image_size, read_bytes
 
 MAGIC = b"\x89PNG\r\n\x1a\n"
 _COLOUR_TYPES = {0: "grey", 2: "colour", 3: "palette", 4: "grey with alpha", 6: "colour with alpha"}
@@ -45,14 +45,6 @@ def read(path: Path) -> Frame:
     return Frame(depth=decode(str(path), read_bytes(path)), source=str(path))
 
 
-def read_bytes(path: Path) -> bytes:
-    """A whole file; a file that can't be read raises `InputError`."""
-    try:
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(f"{path}: can't be read ({error.strerror}); check the path and its permissions") from None
-
-
 class PngSource(FrameSource):
     """One PNG."""
 
@@ -71,4 +63,4 @@ class PngSource(FrameSource):
         return [{"name": "depth", "kind": "depth", "size": self.size, "dtype": "uint16", "frames": 1, "chosen": True}]
 
 
-FORMAT = Format("png", lambda head, path: head.startswith(MAGIC), PngSource)
+FORMAT = Format("png", lambda head, path: head.startswith(MAGIC), PngSource, read_one=read)

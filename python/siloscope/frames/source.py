@@ -71,12 +71,15 @@ class Format:
         Reads headers, no frames; raises `InputError`.
     extra : str or None
         The optional dependency group that reading needs.
+    read_one : callable (path: Path) -> Frame, or None
+        Reads a file that has one frame, without the user's terms: what a folder of such files is read with.
     """
 
     name: str
     sniff: Callable[[bytes, Path], bool]
     open: Callable[[Path, Options], FrameSource]
     extra: str | None = None
+    read_one: Callable[[Path], Frame] | None = None
 
 
 HEAD_BYTES = 4096
@@ -319,3 +322,11 @@ def check_image_size(name: str, width: int, height: int) -> None:
             f"{name}: the image is declared {width} x {height} pixels, more than a depth frame has "
             f"({MAX_SIDE} a side, {MAX_PIXELS} in all) or none at all; the file is damaged, export the frame again"
         )
+
+
+def read_bytes(path: Path) -> bytes:
+    """A whole file; raises `InputError` where it can't be read."""
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise InputError(f"{path}: can't be read ({error.strerror}); check the path and its permissions") from None
