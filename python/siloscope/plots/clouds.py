@@ -56,8 +56,8 @@ def _overview(axes: Axes, seen: Points, adjusted: Points, silo: SiloGeometry) ->
     view = View()
     view.scatter(axes, seen, RED, "input cloud")
     view.scatter(axes, adjusted, BLUE, "adjusted cloud")
-    low, high = float(adjusted[:, 2].min()), float(adjusted[:, 2].max())
-    view.line(axes, np.array([[0, 0, min(low, 0.0)], [0, 0, high]]), color=INK, linewidth=1.6, label="silo axis")
+    low, high = float(adjusted[:, 2].min(initial=0.0)), float(adjusted[:, 2].max(initial=0.0))
+    view.line(axes, np.array([[0, 0, low], [0, 0, high]]), color=INK, linewidth=1.6, label="silo axis")
     outline(axes, view, silo, _top(adjusted))
     bare(axes)
 

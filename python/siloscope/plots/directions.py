@@ -55,7 +55,8 @@ def _spread(axes: Axes, vectors: Points, direction: Points) -> None:
     first /= np.linalg.norm(first)
     second = np.cross(direction, first)
     across = np.degrees(np.column_stack([vectors @ first, vectors @ second]))
-    reach = float(np.clip(np.percentile(angles(vectors, direction), 90.0) * 1.2, 0.05, 60.0))
+    most = np.percentile(angles(vectors, direction), 90.0) if len(vectors) else 0.0
+    reach = float(np.clip(1.2 * most, 0.05, 60.0))
     box = (-reach, reach, -reach, reach)
     axes.hexbin(across[:, 0], across[:, 1], gridsize=44, extent=box, bins="log", mincnt=1, cmap="Blues")
     axes.plot([0.0], [0.0], marker="+", color=RED, markersize=16, markeredgewidth=2.2)

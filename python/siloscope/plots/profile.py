@@ -79,8 +79,9 @@ def _residuals(axes: Axes, r: Points, z: Points, wall: NDArray[np.bool_], silo: 
     axes.scatter(off[chosen], z[chosen], s=1.6, c=BLUE, linewidths=0, alpha=0.25, rasterized=True)
     _running_quantiles(axes, off[wall], z[wall])
     axes.set_xlim(-1.4 * spread, 1.4 * spread)
-    rms = float(np.sqrt(np.nanmean(off[wall] ** 2))) if wall.any() else float("nan")
-    tidy(axes, f"what is left over on the wall: {rms:.2g} mm rms", "distance from the fitted wall, outwards (mm)")
+    known = off[wall][np.isfinite(off[wall])]
+    rms = f": {np.sqrt(np.mean(known**2)):.2g} mm rms" if len(known) else ""
+    tidy(axes, f"what is left over on the wall{rms}", "distance from the fitted wall, outwards (mm)")
 
 
 def _running_quantiles(axes: Axes, off: Points, z: Points) -> None:
@@ -100,7 +101,8 @@ def _reach(z: Points, silo: SiloGeometry) -> tuple[float, float]:
     """Heights to show: the points and the apex, with a little air."""
     ends = [z.min(), z.max()] if len(z) else [0.0, 1.0]
     low, high = float(ends[0]), float(max(ends[1], silo.apex or ends[1]))
-    return low - 0.03 * (high - low), high + 0.03 * (high - low)
+    air = max(0.03 * (high - low), 1e-3)
+    return low - air, high + air
 
 
 def _few(count: int) -> NDArray[np.intp]:

@@ -1,0 +1,38 @@
+"""Fills the parts of pages that come from the program itself, so that they can't go out of date."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import os
+import re
+from collections.abc import Callable
+from typing import Any
+
+_PLACE = re.compile(r"<!-- generated: (\w+) -->")
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Called by mkdocs with each page's source; replaces ``<!-- generated: NAME -->``."""
+    return _PLACE.sub(lambda found: _PARTS[found[1]](), markdown)
+
+
+def commands() -> str:
+    """The help text of every command."""
+    from siloscope.cli import COMMANDS
+
+    return "\n\n".join(f"## {command.name}\n\n{command.help}\n\n{_help(command.name)}" for command in COMMANDS)
+
+
+def _help(command: str) -> str:
+    from siloscope.cli import main
+
+    os.environ.update(NO_COLOR="1", COLUMNS="100", TERMINAL_WIDTH="100")
+    shown = io.StringIO()
+    with contextlib.redirect_stdout(shown):
+        main([command, "--help"])
+    lines = [line.rstrip() for line in shown.getvalue().strip("\n").splitlines()]
+    return "```text\n" + "\n".join(lines) + "\n```"
+
+
+_PARTS: dict[str, Callable[[], str]] = {"commands": commands}
