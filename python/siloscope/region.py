@@ -81,10 +81,11 @@ def box_mask(frame: Frame, box: Sequence[float]) -> Mask:
     return _some(inside, f"{frame.source}: no point lies in the crop box {_extent(points)}")
 
 
-def _some(mask: Mask, complaint: str) -> Mask:
+def _some(mask: Any, complaint: str) -> Mask:
     if not mask.any():
         raise InputError(complaint)
-    return mask
+    chosen: Mask = mask
+    return chosen
 
 
 def _extent(points: NDArray[np.float64]) -> str:
