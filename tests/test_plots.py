@@ -11,11 +11,12 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from siloscope import SiloGeometry, plots
+from siloscope.paper.metrics import LABELS
 from siloscope.paper.scenarios import scenario
 from siloscope.plots.directions import angles
 from siloscope.plots.profile import wall_distance
 from siloscope.region import frame_points
-from siloscope.scene import LABELS, SimulatedFrame
+from siloscope.scene import SimulatedFrame
 
 
 @pytest.fixture(scope="module")
