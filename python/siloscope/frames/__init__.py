@@ -25,6 +25,10 @@ _MODULES = (
     "npy",
     "ply",
     "pcd",
+    "rosbag1",
+    "mcap",
+    "sqlite_bag",
+    "ros2_folder",
 )
 """One module a format, in the order they are asked; each has a `Format` named ``FORMAT``."""
 

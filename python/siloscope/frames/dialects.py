@@ -1,0 +1,24 @@
+"""Who wrote a recording: the container is the same, what the messages mean is not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from siloscope.frames.recorded import RecordedSource
+from siloscope.frames.recording import Recording
+from siloscope.frames.source import Options
+
+
+def source(path: Path, format: str, options: Options, recording: Recording) -> RecordedSource:
+    """The source of frames for a recording, by its topics; closes the recording where it can't be used."""
+    from siloscope.frames import orbbec, realsense, ros
+
+    try:
+        if realsense.is_realsense(recording):
+            return realsense.RealSenseSource(path, f"realsense-{format}", options, recording)
+        if orbbec.is_orbbec(recording):
+            return orbbec.OrbbecSource(path, f"orbbec-{format}", options, recording)
+        return ros.RosSource(path, format, options, recording)
+    except BaseException:
+        recording.close()
+        raise
