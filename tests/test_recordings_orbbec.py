@@ -1,4 +1,4 @@
-"""Orbbec recordings, made up from the layout in the SDK's sources; what follows the image is taken as far as it goes."""
+"""Orbbec recordings, made from the layout in the SDK's sources: what follows the image is taken as far as it goes."""
 
 from __future__ import annotations
 
