@@ -25,10 +25,13 @@ _MODULES = (
     "npy",
     "ply",
     "pcd",
+    "tiff",
     "rosbag1",
     "mcap",
     "sqlite_bag",
     "ros2_folder",
+    "folder",
+    "xyz",
 )
 """One module a format, in the order they are asked; each has a `Format` named ``FORMAT``."""
 

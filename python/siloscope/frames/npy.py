@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import zipfile
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from siloscope.camera import Camera
 from siloscope.errors import InputError
 from siloscope.frame import Frame
 from siloscope.frames.arrays import MAGIC, StoredArray, stored_array
+from siloscope.frames.beside import take_camera_beside
 from siloscope.frames.source import Format, FrameSource, Item, Options, check_image_size
 
 ZIP_MAGIC = b"PK\x03\x04"
@@ -42,6 +44,8 @@ class ArraySource(FrameSource):
         if self.kind != "points":
             height, width = _image_shape(array.shape)[int(self.stacked) :][:2]
             check_image_size(array.name, width, height)
+            if self.kind == "depth":
+                take_camera_beside(self, (width, height))
 
     def _items(self) -> Iterator[Item]:
         if not self.stacked:
@@ -108,8 +112,6 @@ def _kind(array: StoredArray, main: str) -> str:
 
 
 def _with_values(frame: Frame, kind: str, values: NDArray[Any], name: str) -> Frame:
-    from dataclasses import replace
-
     if values.dtype == np.float16:
         values = values.astype(np.float32)
     if kind == "depth":
@@ -245,4 +247,14 @@ def _sniff(head: bytes, path: Path) -> bool:
     return head.startswith(ZIP_MAGIC) and b".npy" in head[26 : 30 + int.from_bytes(head[26:28], "little")]
 
 
-FORMAT = Format("npy", _sniff, _open)
+def read(path: Path) -> Frame:
+    """The frame of a file that has one."""
+    with _open(path, Options(beside=False)) as source:
+        if len(source) != 1:
+            raise InputError(f"{path}: {len(source)} frames in one file of several; give the file alone")
+        frame = next(source._items()).read()
+    unit = source.file_depth_unit if frame.depth_unit is None else frame.depth_unit
+    return replace(frame, camera=source.file_camera, depth_unit=unit, gravity=source.gravity)
+
+
+FORMAT = Format("npy", _sniff, _open, read_one=read)

@@ -10,6 +10,7 @@ from typing import Any
 from siloscope import _core
 from siloscope.errors import InputError
 from siloscope.frame import Frame
+from siloscope.frames.beside import take_camera_beside
 from siloscope.frames.source import Format, FrameSource, Item, Options, check_image_size, read_bytes
 
 MAGIC = b"\x89PNG\r\n\x1a\n"
@@ -52,6 +53,7 @@ class PngSource(FrameSource):
         super().__init__(path, "png", options)
         with path.open("rb") as file:
             self.size = read_size(self.name, file.read(33))
+        take_camera_beside(self, self.size)
 
     def _items(self) -> Iterator[Item]:
         yield Item(self.path.name, lambda: read(self.path))
@@ -60,7 +62,9 @@ class PngSource(FrameSource):
         return 1
 
     def _streams(self) -> list[dict[str, Any]]:
-        return [{"name": "depth", "kind": "depth", "size": self.size, "dtype": "uint16", "frames": 1, "chosen": True}]
+        return [
+            {"name": "depth", "kind": "depth", "size": list(self.size), "dtype": "uint16", "frames": 1, "chosen": True}
+        ]
 
 
 FORMAT = Format("png", lambda head, path: head.startswith(MAGIC), PngSource, read_one=read)

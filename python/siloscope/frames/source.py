@@ -40,12 +40,15 @@ class Options:
         Which of several streams, by name or a part of it that fits only one.
     ray_length : bool
         The file's depth is the length of the ray, not z.
+    beside : bool
+        Whether to take the camera from a file beside the frame, where the format has no place for one.
     """
 
     cameras: tuple[Camera, ...] = ()
     depth_unit: float | None = None
     stream: str | None = None
     ray_length: bool = False
+    beside: bool = True
 
 
 class Item(NamedTuple):
