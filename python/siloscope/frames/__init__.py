@@ -74,7 +74,8 @@ def open(
     UsageError
         For a depth unit that can't be one.
     """
-    options = Options(_cameras(camera), _unit(depth_unit), stream, ray_length)
+    cameras, camera_unit = _cameras(camera)
+    options = Options(cameras, _unit(depth_unit), camera_unit, stream, ray_length)
     if isinstance(path, str | PathLike):
         return _open_one(Path(path), options)
     if not path:
@@ -125,12 +126,14 @@ def _head(path: Path) -> bytes:
     return head
 
 
-def _cameras(camera: Camera | StrPath | None) -> tuple[Camera, ...]:
+def _cameras(camera: Camera | StrPath | None) -> tuple[tuple[Camera, ...], float | None]:
+    """The cameras that the user gives, and the depth unit in their file."""
     if camera is None or isinstance(camera, Camera):
-        return () if camera is None else (camera,)
+        return () if camera is None else (camera,), None
     from siloscope import camera_files
 
-    return camera_files.read(camera).cameras
+    stored = camera_files.read(camera)
+    return stored.cameras, stored.depth_unit
 
 
 def _unit(depth_unit: float | None) -> float | None:

@@ -36,6 +36,8 @@ class Options:
         Empty, or the user's camera; several where their file lists a resolution each (the frame's size chooses).
     depth_unit : float or None
         Metres per raw unit (also scales floating-point depth and points).
+    camera_depth_unit : float or None
+        Metres per raw unit as the user's camera file has it; wins over the file's own, for raw units only.
     stream : str or None
         Which of several streams, by name or a part of it that fits only one.
     ray_length : bool
@@ -46,6 +48,7 @@ class Options:
 
     cameras: tuple[Camera, ...] = ()
     depth_unit: float | None = None
+    camera_depth_unit: float | None = None
     stream: str | None = None
     ray_length: bool = False
     beside: bool = True
@@ -155,7 +158,8 @@ class FrameSource(ABC):
     @property
     def depth_unit(self) -> float | None:
         """Metres per raw unit: the user's, else the file's, else None."""
-        return self.file_depth_unit if self.options.depth_unit is None else self.options.depth_unit
+        known = (self.options.depth_unit, self.options.camera_depth_unit, self.file_depth_unit)
+        return next((unit for unit in known if unit is not None), None)
 
     def __len__(self) -> int:
         count = self._count()
@@ -230,12 +234,20 @@ class FrameSource(ABC):
             "frames": self._count(),
             "streams": self._streams(),
             "camera": camera.to_dict() if camera else None,
+            "camera_from": "given" if self.options.cameras else self.provenance.get("camera_from"),
             "depth_unit": self.depth_unit,
+            "depth_unit_from": self._unit_from(),
             "gravity": None if self.gravity is None else [float(g) for g in self.gravity],
             "timestamps": {"first": times[0], "last": times[-1]} if times else None,
             "provenance": self.provenance,
             "problems": self.problems,
         }
+
+    def _unit_from(self) -> str | None:
+        if self.options.depth_unit is not None:
+            return "given"
+        from_file: str | None = self.provenance.get("depth_unit_from")
+        return from_file if self.options.camera_depth_unit is None else "given camera file"
 
     def close(self) -> None:  # noqa: B027 (most sources hold nothing open)
         """Lets go of the file; iterating is over."""

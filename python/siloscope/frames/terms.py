@@ -25,20 +25,28 @@ class UnknownUnit(InputError):
 
 def finish(frame: Frame, options: Options) -> Frame:
     """The frame with the user's camera, unit and ray length applied and checked; raises `InputError`."""
-    frame = _with_unit(frame, options.depth_unit)
+    frame = _with_unit(frame, options)
     frame = _with_camera(frame, options.cameras)
     return _z_from_ray_length(frame) if options.ray_length else frame
 
 
-def _with_unit(frame: Frame, given: float | None) -> Frame:
-    origin = {} if given is None else {"depth_unit": given, "depth_unit_from": "given"}
-    provenance = {**frame.provenance, **origin}
+def _with_unit(frame: Frame, options: Options) -> Frame:
+    given = options.depth_unit
+    if given is not None:
+        frame = _with_origin(frame, depth_unit=given, depth_unit_from="given")
     if frame.depth is None:
         points = frame.points if given is None or frame.points is None else frame.points * given
-        return replace(frame, points=points, depth_unit=None, provenance=provenance)
+        return replace(frame, points=points, depth_unit=None)
     if np.issubdtype(frame.depth.dtype, np.floating):
-        return _with_metres(replace(frame, provenance=provenance), given)
-    return _with_raw_units(replace(frame, provenance=provenance), given)
+        return _with_metres(frame, given)
+    if given is None and options.camera_depth_unit is not None:
+        given = options.camera_depth_unit
+        frame = _with_origin(frame, depth_unit_from="given camera file")
+    return _with_raw_units(frame, given)
+
+
+def _with_origin(frame: Frame, **known: Any) -> Frame:
+    return replace(frame, provenance={**frame.provenance, **known})
 
 
 def _with_metres(frame: Frame, given: float | None) -> Frame:
@@ -46,12 +54,12 @@ def _with_metres(frame: Frame, given: float | None) -> Frame:
     assert depth is not None
     if given is not None:
         return replace(frame, depth=depth * depth.dtype.type(given), depth_unit=None)
-    if frame.depth_unit is None and (median := _median(depth)) > FARTHEST_M:
+    if (median := _median(depth)) > FARTHEST_M:
         raise UnknownUnit(
             f"{frame.source}: floating-point depth is metres, but the median is {median:.4g}; "
             "give --depth-unit (0.001 for millimetres, 1 if these are metres)"
         )
-    return frame
+    return replace(frame, depth_unit=None)
 
 
 def _median(depth: NDArray[Any]) -> float:
@@ -70,9 +78,18 @@ def _with_raw_units(frame: Frame, given: float | None) -> Frame:
     if not (np.isfinite(unit) and 0 < unit <= 1):
         raise UnknownUnit(f"{frame.source}: a depth unit of {unit} m is not possible; give --depth-unit in metres")
     assert frame.depth is not None
-    if frame.depth.dtype != np.uint16:
+    raw = _as_uint16(frame.depth)
+    frame = _with_origin(frame, depth_unit=float(unit))
+    if raw is None:
         return replace(frame, depth=frame.depth * float(unit), depth_unit=None)
-    return replace(frame, depth_unit=float(unit))
+    return replace(frame, depth=raw, depth_unit=float(unit))
+
+
+def _as_uint16(depth: NDArray[Any]) -> NDArray[np.uint16] | None:
+    """Integers of another width as 16-bit raw units, in which 65535 is no measurement; None where they don't fit."""
+    if depth.dtype == np.uint16:
+        return depth
+    return np.maximum(depth, 0).astype(np.uint16) if depth.max(initial=0) <= 65_535 else None
 
 
 def _with_camera(frame: Frame, given: tuple[Camera, ...]) -> Frame:
@@ -85,8 +102,8 @@ def _with_camera(frame: Frame, given: tuple[Camera, ...]) -> Frame:
             f"{frame.source}: the frame is {size[0]} x {size[1]} pixels but the camera "
             f"{camera.width} x {camera.height}; give the camera of this stream with --camera"
         )
-    origin = {"camera_from": "given"} if given else {}
-    return replace(frame, camera=camera, provenance={**frame.provenance, **origin})
+    frame = _with_origin(frame, camera_from="given") if given else frame
+    return replace(frame, camera=camera)
 
 
 def _size(frame: Frame) -> tuple[int, int] | None:
@@ -119,4 +136,4 @@ def _z_from_ray_length(frame: Frame) -> Frame:
     stretch = np.sqrt(1.0 + np.sum(frame.camera.rays() ** 2, axis=2))
     metres = np.where(frame.depth == 65535, 0, frame.depth) if frame.depth.dtype == np.uint16 else frame.depth
     depth = metres * (frame.depth_unit or 1.0) / stretch
-    return replace(frame, depth=depth, depth_unit=None, provenance={**frame.provenance, "ray_length": True})
+    return replace(_with_origin(frame, ray_length=True), depth=depth, depth_unit=None)
