@@ -236,14 +236,14 @@ class FrameSource(ABC):
             "camera": camera.to_dict() if camera else None,
             "camera_from": "given" if self.options.cameras else self.provenance.get("camera_from"),
             "depth_unit": self.depth_unit,
-            "depth_unit_from": self._unit_from(),
+            "depth_unit_from": self._origin_of_unit(),
             "gravity": None if self.gravity is None else [float(g) for g in self.gravity],
             "timestamps": {"first": times[0], "last": times[-1]} if times else None,
             "provenance": self.provenance,
             "problems": self.problems,
         }
 
-    def _unit_from(self) -> str | None:
+    def _origin_of_unit(self) -> str | None:
         if self.options.depth_unit is not None:
             return "given"
         from_file: str | None = self.provenance.get("depth_unit_from")

@@ -77,11 +77,12 @@ def _with_raw_units(frame: Frame, given: float | None) -> Frame:
         )
     if not (np.isfinite(unit) and 0 < unit <= 1):
         raise UnknownUnit(f"{frame.source}: a depth unit of {unit} m is not possible; give --depth-unit in metres")
-    assert frame.depth is not None
-    raw = _as_uint16(frame.depth)
+    depth = frame.depth
+    assert depth is not None
+    raw = _as_uint16(depth)
     frame = _with_origin(frame, depth_unit=float(unit))
     if raw is None:
-        return replace(frame, depth=frame.depth * float(unit), depth_unit=None)
+        return replace(frame, depth=depth * float(unit), depth_unit=None)
     return replace(frame, depth=raw, depth_unit=float(unit))
 
 
