@@ -30,6 +30,10 @@ _MODULES = (
     "mcap",
     "sqlite_bag",
     "ros2_folder",
+    "mkv",
+    "e57",
+    "las",
+    "exr",
     "folder",
     "xyz",
 )
