@@ -6,6 +6,7 @@ mod camera;
 mod convert;
 mod files;
 mod scene;
+mod surface;
 
 /// The compiled core of siloscope.
 #[pymodule]
@@ -14,5 +15,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     camera::register(m)?;
     files::register(m)?;
     scene::register(m)?;
+    surface::register(m)?;
     Ok(())
 }

@@ -7,7 +7,15 @@
 pub mod camera;
 pub mod error;
 pub mod nearest;
+pub mod fit;
+pub mod patches;
+pub mod pixels;
 pub mod pose;
+pub mod refine;
+pub mod sensor;
+pub mod start;
+pub mod surface;
+pub mod verdict;
 
 pub use camera::{Camera, Distortion};
 pub use error::{Error, Result};

@@ -1,0 +1,105 @@
+//! The surface fit.
+
+use crate::convert::value_error;
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use siloscope::Vec3;
+use siloscope::fit::{Knowledge, SurfaceFit, fit_image};
+use siloscope::patches::DepthImage;
+use siloscope::sensor::{DepthBias, DepthError, NoiseLaw};
+use siloscope::surface::PARAMETERS;
+
+/// Bias and noise as plain numbers: offset, scale, quadratic; floor, constant, linear, quadratic, factor, power.
+type Bias = (f64, f64, f64);
+type Noise = (f64, f64, f64, f64, f64, f64);
+
+fn depth_error(bias: Bias, bias_std: Bias, noise: Option<Noise>) -> DepthError {
+    DepthError {
+        bias: DepthBias { offset: bias.0, scale: bias.1, quadratic: bias.2 },
+        bias_std: [bias_std.0, bias_std.1, bias_std.2],
+        noise: noise.map(|n| NoiseLaw {
+            floor: n.0,
+            constant: n.1,
+            linear: n.2,
+            quadratic: n.3,
+            power_factor: n.4,
+            power: n.5,
+        }),
+    }
+}
+
+/// Fits the wall to a depth image: float32 depth (H, W) in metres and float64 rays (H, W, 2).
+///
+/// Returns a dictionary of plain numbers and arrays, or None where nothing of revolution is found.
+#[pyfunction]
+#[pyo3(signature = (depth, rays, bias, bias_std, noise=None, radius=None, gravity=None))]
+#[allow(clippy::too_many_arguments)]
+fn surface_fit_image<'py>(
+    py: Python<'py>,
+    depth: PyReadonlyArray2<'py, f32>,
+    rays: PyReadonlyArray3<'py, f64>,
+    bias: Bias,
+    bias_std: Bias,
+    noise: Option<Noise>,
+    radius: Option<(f64, f64)>,
+    gravity: Option<(f64, f64, f64, f64)>,
+) -> PyResult<Option<Bound<'py, PyDict>>> {
+    let (height, width) = (depth.shape()[0], depth.shape()[1]);
+    if rays.shape() != [height, width, 2] {
+        return Err(value_error(format!("rays have shape {:?}, the depth {:?}", rays.shape(), depth.shape())));
+    }
+    let depth = depth.as_slice().map_err(value_error)?;
+    let rays = rays.as_slice().map_err(value_error)?.as_chunks::<2>().0;
+    let know = Knowledge {
+        error: depth_error(bias, bias_std, noise),
+        radius,
+        gravity: gravity.map(|(x, y, z, std)| (Vec3::new(x, y, z), std)),
+    };
+    let image = DepthImage { width, height, rays, depth };
+    let found = py.detach(|| fit_image(&image, &know));
+    found.map(|fit| result(py, &fit)).transpose()
+}
+
+fn matrix<'py>(py: Python<'py>, m: &siloscope::surface::Information) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    PyArray1::from_slice(py, m.transpose().as_slice()).reshape([PARAMETERS, PARAMETERS])
+}
+
+fn result<'py>(py: Python<'py>, found: &SurfaceFit) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    let pose = found.fit.surface.pose;
+    out.set_item("pose", (pose.r_x, pose.r_y, pose.t_x, pose.t_y))?;
+    out.set_item("radius", found.fit.surface.radius)?;
+    out.set_item("cone", found.fit.surface.cone.map(|c| (c.slope, c.apex)))?;
+    let bias = found.fit.bias;
+    out.set_item("bias", (bias.offset, bias.scale, bias.quadratic))?;
+    out.set_item("inside", found.fit.inside)?;
+    out.set_item("misfit", found.fit.misfit)?;
+    out.set_item("chi_square", found.chi_square)?;
+    out.set_item("free", found.free.to_vec())?;
+    out.set_item("covariance", matrix(py, &found.covariance)?)?;
+    out.set_item("information", matrix(py, &found.information)?)?;
+    let n = found.noise;
+    out.set_item("noise", (n.floor, n.constant, n.linear, n.quadratic, n.power_factor, n.power))?;
+    let e = found.evidence;
+    let evidence = PyDict::new(py);
+    evidence.set_item("patches", e.patches)?;
+    for (key, value) in [
+        ("share", e.share),
+        ("turn", e.turn),
+        ("turn_std", e.turn_std),
+        ("bend", e.bend),
+        ("bend_std", e.bend_std),
+        ("arc", e.arc),
+        ("behind", e.behind),
+    ] {
+        evidence.set_item(key, value)?;
+    }
+    out.set_item("evidence", evidence)?;
+    out.set_item("timing", found.timing.clone())?;
+    Ok(out)
+}
+
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(surface_fit_image, m)?)
+}

@@ -1,0 +1,364 @@
+//! Patches: the frame in small pieces, each with its mean position, its normal and how sure both are.
+//!
+//! A depth image is cut into square tiles and a plane is fitted to each, against pixels that don't belong to it
+//! (dust, edges). Everything up to the last step of the surface fit works on a few thousand patches, not pixels.
+
+use crate::Vec3;
+use crate::sensor::NoiseLaw;
+
+/// A small piece of surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Patch {
+    /// Direction along which the position is uncertain: the ray with z = 1 (image), the normal (cloud).
+    pub q: Vec3,
+    /// Measured position along `q` of the patch's centre: depth (image); 0 (cloud).
+    pub measured: f64,
+    /// Where `q` starts: the camera (image), the mean point (cloud).
+    pub origin: Vec3,
+    /// Unit normal towards the camera.
+    pub normal: Vec3,
+    /// Standard deviation of the normal's direction, radians.
+    pub sigma_normal: f64,
+    /// Scatter of the single measurements about the patch's plane, metres along `q`.
+    pub scatter: f64,
+    /// Number of measurements.
+    pub count: f64,
+    /// Whether one plane describes the patch.
+    pub smooth: bool,
+    /// Position in the grid of tiles (column, row); (0, 0) for clouds.
+    pub tile: (u32, u32),
+}
+
+impl Patch {
+    /// The centre for a given value along `q`.
+    #[inline]
+    pub fn at(&self, s: f64) -> Vec3 {
+        self.origin + self.q * s
+    }
+}
+
+/// No neighbour: outside the image, or without depth.
+pub const NONE: u32 = u32::MAX;
+
+/// The patches of a frame and who lies beside whom.
+#[derive(Debug, Clone, Default)]
+pub struct Patches {
+    /// The patches.
+    pub list: Vec<Patch>,
+    /// The eight neighbours of each; `NONE` where there is none.
+    pub neighbours: Vec<[u32; 8]>,
+    /// Side of a tile in pixels (images).
+    pub side: usize,
+    /// Tiles per row (images).
+    pub columns: usize,
+    /// Whether these come from a cloud without rays.
+    pub cloud: bool,
+}
+
+/// A depth image: rays and depths in metres, row by row; depths that are not positive or not finite are missing.
+#[derive(Debug, Clone, Copy)]
+pub struct DepthImage<'a> {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Ray `(x/z, y/z)` of each pixel.
+    pub rays: &'a [[f64; 2]],
+    /// Depth of each pixel, metres.
+    pub depth: &'a [f32],
+}
+
+/// Sums of a plane fit z = a + b·u + c·v over pixels, u and v relative to the tile's centre.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    n: f64,
+    u: f64,
+    v: f64,
+    uu: f64,
+    uv: f64,
+    vv: f64,
+    z: f64,
+    uz: f64,
+    vz: f64,
+    zz: f64,
+}
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Plane {
+    a: f64,
+    b: f64,
+    c: f64,
+}
+
+impl Sums {
+    #[inline]
+    fn add(&mut self, u: f64, v: f64, z: f64) {
+        self.n += 1.0;
+        self.u += u;
+        self.v += v;
+        self.uu += u * u;
+        self.uv += u * v;
+        self.vv += v * v;
+        self.z += z;
+        self.uz += u * z;
+        self.vz += v * z;
+        self.zz += z * z;
+    }
+
+    /// Adds a neighbour's sums, whose centre lies at (du, dv) from ours.
+    fn add_shifted(&mut self, o: &Sums, du: f64, dv: f64) {
+        self.n += o.n;
+        self.u += o.u + du * o.n;
+        self.v += o.v + dv * o.n;
+        self.uu += o.uu + 2.0 * du * o.u + du * du * o.n;
+        self.uv += o.uv + du * o.v + dv * o.u + du * dv * o.n;
+        self.vv += o.vv + 2.0 * dv * o.v + dv * dv * o.n;
+        self.z += o.z;
+        self.uz += o.uz + du * o.z;
+        self.vz += o.vz + dv * o.z;
+        self.zz += o.zz;
+    }
+
+    /// Least-squares plane; `None` for pixels on a line or a point.
+    fn plane(&self) -> Option<Plane> {
+        let (mu, mv, mz) = (self.u / self.n, self.v / self.n, self.z / self.n);
+        let (uu, uv, vv) = (self.uu - mu * self.u, self.uv - mu * self.v, self.vv - mv * self.v);
+        let (uz, vz) = (self.uz - mu * self.z, self.vz - mv * self.z);
+        let det = uu * vv - uv * uv;
+        if !(det > 0.05 * uu * vv && det > 1e-9) {
+            return None;
+        }
+        let (b, c) = ((uz * vv - vz * uv) / det, (vz * uu - uz * uv) / det);
+        Some(Plane { a: mz - b * mu - c * mv, b, c })
+    }
+
+    /// Root-mean-square distance of the pixels from a plane that was fitted to them.
+    fn scatter(&self, p: &Plane) -> f64 {
+        let residual = self.zz - p.a * self.z - p.b * self.uz - p.c * self.vz;
+        (residual.max(0.0) / (self.n - 3.0).max(1.0)).sqrt()
+    }
+}
+
+/// Side of the tiles: about 80 of them across the image.
+pub fn tile_side(width: usize) -> usize {
+    ((width as f64 / 80.0).round() as usize).clamp(4, 16)
+}
+
+/// Cuts a depth image into tiles. `noise` is the expected noise where it is known.
+pub fn tile_patches(image: &DepthImage, noise: Option<&NoiseLaw>) -> Patches {
+    let side = tile_side(image.width);
+    let (columns, rows) = (image.width / side, image.height / side);
+    let mut sums: Vec<Option<(Sums, Plane, f64)>> = Vec::with_capacity(columns * rows);
+    for row in 0..rows {
+        for column in 0..columns {
+            sums.push(tile(image, column * side, row * side, side, noise));
+        }
+    }
+    let mut patches = Patches { side, columns, ..Patches::default() };
+    let mut index = vec![NONE; columns * rows];
+    for row in 0..rows {
+        for column in 0..columns {
+            if let Some(patch) = patch(image, &sums, (column, row), (columns, rows), side) {
+                index[row * columns + column] = patches.list.len() as u32;
+                patches.list.push(patch);
+            }
+        }
+    }
+    patches.neighbours = patches.list.iter().map(|p| neighbours(&index, p.tile, columns, rows)).collect();
+    patches
+}
+
+fn tile(image: &DepthImage, u0: usize, v0: usize, side: usize, noise: Option<&NoiseLaw>) -> Option<(Sums, Plane, f64)> {
+    let centre = (side as f64 - 1.0) / 2.0;
+    let mut sums = Sums::default();
+    for v in 0..side {
+        let row = &image.depth[(v0 + v) * image.width + u0..][..side];
+        for (u, &z) in row.iter().enumerate() {
+            if z > 0.0 && z < f32::INFINITY {
+                sums.add(u as f64 - centre, v as f64 - centre, f64::from(z));
+            }
+        }
+    }
+    if sums.n < 0.3 * (side * side) as f64 {
+        return None;
+    }
+    let plane = sums.plane()?;
+    let scatter = sums.scatter(&plane);
+    let depth = sums.z / sums.n;
+    let expected = noise.map_or(0.002 * depth, |law| 1.4 * law.sigma(depth) + 3e-4 * depth);
+    if scatter <= expected {
+        return Some((sums, plane, scatter));
+    }
+    Some(robust_tile(image, u0, v0, side).unwrap_or((sums, plane, scatter)))
+}
+
+/// Plane through the tile's majority: a start from the medians of its quadrants, then inliers only.
+fn robust_tile(image: &DepthImage, u0: usize, v0: usize, side: usize) -> Option<(Sums, Plane, f64)> {
+    let centre = (side as f64 - 1.0) / 2.0;
+    let mut pixels = [(0.0f64, 0.0f64, 0.0f64); 256];
+    let mut n = 0;
+    for v in 0..side {
+        for u in 0..side {
+            let z = image.depth[(v0 + v) * image.width + u0 + u];
+            if z > 0.0 && z < f32::INFINITY {
+                pixels[n] = (u as f64 - centre, v as f64 - centre, f64::from(z));
+                n += 1;
+            }
+        }
+    }
+    let pixels = &pixels[..n];
+    let mut plane = quadrant_plane(pixels)?;
+    let mut kept = None;
+    for _ in 0..3 {
+        let mut residuals: Vec<f64> =
+            pixels.iter().map(|p| (p.2 - plane.a - plane.b * p.0 - plane.c * p.1).abs()).collect();
+        let middle = residuals.len() / 2;
+        let (_, &mut median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
+        let limit = (3.0 * 1.4826 * median).max(1e-4);
+        let mut sums = Sums::default();
+        for p in pixels {
+            if (p.2 - plane.a - plane.b * p.0 - plane.c * p.1).abs() <= limit {
+                sums.add(p.0, p.1, p.2);
+            }
+        }
+        if sums.n < 0.55 * n as f64 {
+            return None;
+        }
+        plane = sums.plane()?;
+        kept = Some((sums, plane, sums.scatter(&plane)));
+    }
+    kept
+}
+
+fn quadrant_plane(pixels: &[(f64, f64, f64)]) -> Option<Plane> {
+    let mut sums = Sums::default();
+    for quadrant in 0..4 {
+        let inside = |p: &&(f64, f64, f64)| usize::from(p.0 > 0.0) + 2 * usize::from(p.1 > 0.0) == quadrant;
+        let mut z: Vec<f64> = pixels.iter().filter(inside).map(|p| p.2).collect();
+        if z.is_empty() {
+            continue;
+        }
+        let n = z.len() as f64;
+        let u = pixels.iter().filter(inside).map(|p| p.0).sum::<f64>() / n;
+        let v = pixels.iter().filter(inside).map(|p| p.1).sum::<f64>() / n;
+        let middle = z.len() / 2;
+        let (_, &mut median, _) = z.select_nth_unstable_by(middle, f64::total_cmp);
+        sums.add(u, v, median);
+    }
+    if sums.n < 3.0 { None } else { sums.plane() }
+}
+
+/// The patch of one tile; its normal comes from the tile and those neighbours that continue its plane.
+fn patch(
+    image: &DepthImage,
+    sums: &[Option<(Sums, Plane, f64)>],
+    (column, row): (usize, usize),
+    (columns, rows): (usize, usize),
+    side: usize,
+) -> Option<Patch> {
+    let (own, plane, scatter) = sums[row * columns + column].as_ref()?;
+    let depth = own.z / own.n;
+    let step = side as f64;
+    let mut pooled = *own;
+    let mut joined = 1;
+    for dv in -1i64..=1 {
+        for du in -1i64..=1 {
+            let (c, r) = (column as i64 + du, row as i64 + dv);
+            if (du, dv) == (0, 0) || c < 0 || r < 0 || c >= columns as i64 || r >= rows as i64 {
+                continue;
+            }
+            if let Some((other, _, _)) = &sums[r as usize * columns + c as usize] {
+                let (u, v) = (du as f64 * step + other.u / other.n, dv as f64 * step + other.v / other.n);
+                let gap = other.z / other.n - plane.a - plane.b * u - plane.c * v;
+                if gap.abs() < 3.0 * scatter + 0.01 * depth {
+                    pooled.add_shifted(other, du as f64 * step, dv as f64 * step);
+                    joined += 1;
+                }
+            }
+        }
+    }
+    let wide = pooled.plane()?;
+    let (mu, mv) = (own.u / own.n, own.v / own.n);
+    let z = depth;
+    let (q, q_u, q_v) = ray_and_steps(image, column * side, row * side, side, (mu, mv));
+    let normal = (q * wide.b + q_u * z).cross(&(q * wide.c + q_v * z));
+    let length = normal.norm();
+    if !(length > 0.0) {
+        return None;
+    }
+    let normal = normal * (if normal.dot(&q) > 0.0 { -1.0 } else { 1.0 } / length);
+    let spread = (pooled.uu - pooled.u * pooled.u / pooled.n).min(pooled.vv - pooled.v * pooled.v / pooled.n);
+    let sigma_slope = scatter / spread.max(1e-9).sqrt();
+    let sigma_normal = sigma_slope * z * (q_u.norm() + q_v.norm()) / 1.4 / length;
+    Some(Patch {
+        q,
+        measured: z,
+        origin: Vec3::zeros(),
+        normal,
+        sigma_normal,
+        scatter: *scatter,
+        count: own.n,
+        smooth: joined >= 3 && own.n >= 0.5 * step * step,
+        tile: (column as u32, row as u32),
+    })
+}
+
+/// Ray at the centroid (mu, mv) of a tile, and its change per pixel along u and v.
+fn ray_and_steps(image: &DepthImage, u0: usize, v0: usize, side: usize, (mu, mv): (f64, f64)) -> (Vec3, Vec3, Vec3) {
+    let at = |u: usize, v: usize| image.rays[v * image.width + u];
+    let last = side - 1;
+    let (nw, ne) = (at(u0, v0), at(u0 + last, v0));
+    let (sw, se) = (at(u0, v0 + last), at(u0 + last, v0 + last));
+    let span = 2.0 * last as f64;
+    let step = |k: usize| ((ne[k] + se[k] - nw[k] - sw[k]) / span, (sw[k] + se[k] - nw[k] - ne[k]) / span);
+    let ((xu, xv), (yu, yv)) = (step(0), step(1));
+    let mean = |k: usize| (nw[k] + ne[k] + sw[k] + se[k]) / 4.0;
+    (
+        Vec3::new(mean(0) + xu * mu + xv * mv, mean(1) + yu * mu + yv * mv, 1.0),
+        Vec3::new(xu, yu, 0.0),
+        Vec3::new(xv, yv, 0.0),
+    )
+}
+
+fn neighbours(index: &[u32], (column, row): (u32, u32), columns: usize, rows: usize) -> [u32; 8] {
+    const AROUND: [(i64, i64); 8] = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+    AROUND.map(|(du, dv)| {
+        let (c, r) = (i64::from(column) + du, i64::from(row) + dv);
+        let inside = c >= 0 && r >= 0 && c < columns as i64 && r < rows as i64;
+        if inside { index[r as usize * columns + c as usize] } else { NONE }
+    })
+}
+
+/// Noise law that explains the patches' own scatter: σ² = a² + b²·d⁴, from medians over depth.
+pub fn noise_from_scatter(samples: &mut [(f64, f64)], floor: f64) -> NoiseLaw {
+    const BINS: usize = 8;
+    samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let size = samples.len().div_ceil(BINS).max(1);
+    let (mut n, mut x, mut xx, mut y, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for bin in samples.chunks_mut(size) {
+        let middle = bin.len() / 2;
+        let depth = bin[middle].0;
+        let (_, &mut (_, sigma), _) = bin.select_nth_unstable_by(middle, |a, b| a.1.total_cmp(&b.1));
+        let (d4, s2) = (depth.powi(4), sigma * sigma);
+        n += 1.0;
+        x += d4;
+        xx += d4 * d4;
+        y += s2;
+        xy += d4 * s2;
+    }
+    if n == 0.0 {
+        return NoiseLaw::uniform(floor);
+    }
+    let det: f64 = n * xx - x * x;
+    let slope = if det > 1e-12 * n * xx { ((n * xy - x * y) / det).max(0.0) } else { 0.0 };
+    let constant = ((y - slope * x) / n).max(0.0);
+    let slope = if constant == 0.0 && x > 0.0 { slope.min(y / x) } else { slope };
+    NoiseLaw {
+        floor: floor.max(constant.sqrt()),
+        constant: 0.0,
+        linear: 0.0,
+        quadratic: slope.sqrt(),
+        power_factor: 0.0,
+        power: 1.0,
+    }
+}

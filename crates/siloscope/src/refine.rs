@@ -1,0 +1,336 @@
+//! Robust fit of the wall to patches: Gauss–Newton steps on residuals along the rays, in units of their noise.
+//!
+//! A patch's residual is r = m − f(d(θ)): its measured depth m against the biased depth f of the wall's true depth d(θ)
+//! on its ray. Patches that are not wall lose their weight by residual (Tukey) and by normal. Besides the sensor's
+//! noise, a misfit τ of the wall itself (dents, rust, the tile's own curvature) enters every residual's variance;
+//! it starts large and falls to what the agreeing patches need.
+
+use crate::Vec3;
+use crate::patches::Patches;
+use crate::sensor::{DepthBias, NoiseLaw};
+use crate::surface::{Information, PARAMETERS, Parameters, Part, PlacedSurface, SiloSurface};
+
+/// What is known before the frame is looked at.
+#[derive(Debug, Clone)]
+pub struct Prior {
+    /// Expected depth bias.
+    pub bias: DepthBias,
+    /// Its standard deviations (offset, scale, quadratic); zero pins a value.
+    pub bias_std: [f64; 3],
+    /// Known radius and its standard deviation, metres.
+    pub radius: Option<(f64, f64)>,
+    /// Direction of gravity in the camera frame and its standard deviation, radians.
+    pub gravity: Option<(Vec3, f64)>,
+}
+
+/// State of the fit.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    /// The wall.
+    pub surface: SiloSurface,
+    /// The depth bias.
+    pub bias: DepthBias,
+    /// Whether the wall is seen from inside.
+    pub inside: bool,
+    /// Misfit of the wall beside the sensor's noise, metres across the wall.
+    pub misfit: f64,
+    /// Weight of each patch, 0 to 1.
+    pub weights: Vec<f64>,
+}
+
+/// One patch's equation.
+#[derive(Debug, Clone, Copy)]
+pub struct Equation {
+    /// Residual along the ray, metres.
+    pub residual: f64,
+    /// Derivative of the residual.
+    pub jacobian: Parameters,
+    /// Variance of the residual: noise of the mean and misfit.
+    pub variance: f64,
+    /// Cosine between the ray and the wall's normal: residual × cosine is the distance from the wall.
+    pub cosine: f64,
+    /// Squared angle between the patch's normal and the wall's.
+    pub angle2: f64,
+    /// Part of the wall.
+    pub part: Part,
+    /// Height in the silo frame.
+    pub z: f64,
+}
+
+/// Everything that stays the same during a fit.
+#[derive(Debug)]
+pub struct Problem<'a> {
+    /// The patches.
+    pub patches: &'a Patches,
+    /// Noise of a single measurement.
+    pub noise: NoiseLaw,
+    /// Prior knowledge.
+    pub prior: &'a Prior,
+    /// Size of a pixel at depth 1.
+    pub pixel: f64,
+}
+
+/// Smallest misfit assumed, metres: what rounding in the tiles' own means amounts to.
+const MISFIT_FLOOR: f64 = 2e-4;
+/// Residuals beyond this many standard deviations have no weight (Tukey's constant).
+const TUKEY: f64 = 4.7;
+
+impl Problem<'_> {
+    /// The equation of patch `i`; `None` where its ray runs along the wall or it straddles the joint.
+    pub fn equation(&self, fit: &Fit, placed: &PlacedSurface, i: usize) -> Option<Equation> {
+        let patch = &self.patches.list[i];
+        let cloud = self.patches.cloud;
+        let d = if cloud { 0.0 } else { fit.bias.true_depth(patch.measured) };
+        let p = patch.at(d);
+        let at = placed.local(&p);
+        let length = at.gradient.norm();
+        let q = if cloud { at.gradient / length } else { placed.turn(&patch.q) };
+        let along = at.gradient.dot(&q);
+        let cosine = along / (length * q.norm());
+        let size = self.pixel * self.patches.side as f64 * d / cosine.abs();
+        if !(cosine.abs() > 0.02) || (at.p.z - placed.bottom()).abs() < 0.5 * size {
+            return None;
+        }
+        let slope = if cloud { 1.0 } else { fit.bias.slope(d) };
+        let mut jacobian = Parameters::zeros();
+        for (k, f) in placed.derivative(&p, &at).into_iter().enumerate() {
+            jacobian[k] = f * slope / along;
+        }
+        if !cloud {
+            jacobian[7] = -1.0;
+            jacobian[8] = -d;
+            jacobian[9] = -d * d;
+        }
+        let sigma = if cloud { patch.scatter } else { self.noise.sigma(d) };
+        let misfit = fit.misfit / cosine;
+        let side = if fit.inside { -1.0 } else { 1.0 };
+        let normal = placed.turn(&patch.normal);
+        Some(Equation {
+            residual: slope * at.value / along,
+            jacobian,
+            variance: sigma * sigma / patch.count + misfit * misfit,
+            cosine: cosine.abs(),
+            angle2: 2.0 * (1.0 - side * normal.dot(&at.gradient) / length),
+            part: at.part,
+            z: at.p.z,
+        })
+    }
+
+    /// Robust weight of an equation: by residual and by normal.
+    pub fn weight(&self, equation: &Equation, i: usize, angle: f64) -> f64 {
+        let patch = &self.patches.list[i];
+        let limit = angle + 3.0 * patch.sigma_normal;
+        let by_normal = 1.0 - equation.angle2 / (limit * limit);
+        if by_normal <= 0.0 || !patch.smooth {
+            return 0.0;
+        }
+        tukey(equation.residual * equation.residual / equation.variance) * by_normal.min(0.5) * 2.0
+    }
+
+    /// Runs `rounds` Gauss–Newton steps over every `stride`-th patch; `angle` is the tolerated angle between normals.
+    pub fn refine(&self, fit: &mut Fit, rounds: usize, stride: usize, angle: f64) {
+        for _ in 0..rounds {
+            self.step(fit, stride, angle);
+        }
+    }
+
+    fn step(&self, fit: &mut Fit, stride: usize, angle: f64) {
+        let placed = PlacedSurface::new(fit.surface);
+        let mut system = System::with_prior(self.prior, fit);
+        let mut across: Vec<f64> = Vec::with_capacity(self.patches.list.len() / stride + 1);
+        let (mut cylinder, mut cone, mut noise) = (0.0, 0.0, 0.0);
+        fit.weights.iter_mut().for_each(|w| *w = 0.0);
+        for i in (0..self.patches.list.len()).step_by(stride) {
+            let Some(equation) = self.equation(fit, &placed, i) else { continue };
+            let weight = self.weight(&equation, i, angle);
+            if weight <= 0.0 {
+                continue;
+            }
+            fit.weights[i] = weight;
+            system.add(&equation, weight);
+            across.push((equation.residual * equation.cosine).abs());
+            let misfit = fit.misfit / equation.cosine;
+            noise += (equation.variance - misfit * misfit).max(0.0) * equation.cosine * equation.cosine;
+            *(if equation.part == Part::Cylinder { &mut cylinder } else { &mut cone }) += weight;
+        }
+        let noise = noise / (across.len().max(1)) as f64;
+        if let Some(step) = system.solve(fit) {
+            fit.apply(&step);
+        }
+        fit.misfit = next_misfit(fit.misfit, &mut across, noise);
+        let few = 6.0 / stride as f64;
+        if cone < few && fit.surface.radius.is_some() {
+            fit.surface.cone = None;
+        } else if cylinder < few && fit.surface.cone.is_some() {
+            fit.surface.radius = None;
+        }
+    }
+}
+
+/// Tukey's weight for a squared residual in units of its variance.
+#[inline]
+pub fn tukey(squared: f64) -> f64 {
+    let t = 1.0 - squared / (TUKEY * TUKEY);
+    if t <= 0.0 { 0.0 } else { t * t }
+}
+
+/// What the agreeing patches' distances from the wall need beside the noise; at most halves in one step.
+fn next_misfit(now: f64, across: &mut [f64], noise: f64) -> f64 {
+    if across.is_empty() {
+        return now;
+    }
+    let middle = across.len() / 2;
+    let (_, &mut median, _) = across.select_nth_unstable_by(middle, f64::total_cmp);
+    let spread = 1.4826 * median;
+    (spread * spread - noise).max(0.0).sqrt().clamp(now * 0.4, now).max(MISFIT_FLOOR)
+}
+
+impl Fit {
+    fn apply(&mut self, step: &Parameters) {
+        let shrink = |value: f64, share: f64, of: f64| value.clamp(-share * of, share * of);
+        let mut step = *step;
+        let reach = self.surface.radius.or(self.surface.cone.map(|c| c.apex * c.slope)).unwrap_or(1.0).abs();
+        for k in 0..2 {
+            step[k] = shrink(step[k], 0.2, 1.0);
+        }
+        for k in [2, 3, 4, 6] {
+            step[k] = shrink(step[k], 0.3, reach);
+        }
+        step[5] = shrink(step[5], 0.3, self.surface.cone.map_or(1.0, |c| c.slope));
+        self.surface = self.surface.stepped(&step);
+        self.bias.offset += step[7];
+        self.bias.scale += step[8];
+        self.bias.quadratic += step[9];
+    }
+}
+
+impl Fit {
+    /// Gives the cylinder a known radius by scaling every length, and the depth bias so that nothing measured changes.
+    pub fn rescale_to(&mut self, radius: f64) {
+        let Some(now) = self.surface.radius else { return };
+        let factor = radius / now;
+        let SiloSurface { pose, cone, .. } = self.surface;
+        self.surface = SiloSurface {
+            pose: crate::SiloPose { t_x: pose.t_x * factor, t_y: pose.t_y * factor, ..pose },
+            radius: Some(radius),
+            cone: cone.map(|c| crate::surface::Cone { apex: c.apex * factor, ..c }),
+        };
+        self.bias.scale = (1.0 + self.bias.scale) / factor - 1.0;
+        self.bias.quadratic /= factor * factor;
+    }
+}
+
+/// Normal equations H·step = −g.
+#[derive(Debug, Clone)]
+pub struct System {
+    /// Information H from the frame and the prior.
+    pub information: Information,
+    /// Gradient g.
+    pub gradient: Parameters,
+    /// The prior's share of H.
+    pub prior: Information,
+}
+
+impl System {
+    /// The prior alone, seen from the fit's present state.
+    pub fn with_prior(prior: &Prior, fit: &Fit) -> Self {
+        let mut system =
+            Self { information: Information::zeros(), gradient: Parameters::zeros(), prior: Information::zeros() };
+        let now = [fit.bias.offset, fit.bias.scale, fit.bias.quadratic];
+        let expected = [prior.bias.offset, prior.bias.scale, prior.bias.quadratic];
+        for k in 0..3 {
+            if prior.bias_std[k] > 0.0 {
+                system.add_prior(7 + k, now[k] - expected[k], prior.bias_std[k]);
+            }
+        }
+        if let (Some((radius, std)), Some(now)) = (prior.radius, fit.surface.radius) {
+            system.add_prior(4, now - radius, std);
+        }
+        if let Some((gravity, std)) = prior.gravity {
+            let expected = crate::SiloPose::from_axis(&gravity, &Vec3::zeros());
+            let pose = &fit.surface.pose;
+            system.add_prior(0, pose.r_x - expected.r_x, std / pose.r_y.cos().max(1e-3));
+            system.add_prior(1, pose.r_y - expected.r_y, std);
+        }
+        system
+    }
+
+    fn add_prior(&mut self, k: usize, residual: f64, std: f64) {
+        let information = 1.0 / (std * std);
+        self.prior[(k, k)] += information;
+        self.information[(k, k)] += information;
+        self.gradient[k] += information * residual;
+    }
+
+    /// Adds an equation with a robust weight.
+    #[inline]
+    pub fn add(&mut self, equation: &Equation, weight: f64) {
+        let scale = weight / equation.variance;
+        let j = equation.jacobian.as_slice();
+        let h = self.information.as_mut_slice();
+        for column in 0..PARAMETERS {
+            let factor = scale * j[column];
+            for row in 0..=column {
+                h[column * PARAMETERS + row] += factor * j[row];
+            }
+            self.gradient[column] += factor * equation.residual;
+        }
+    }
+
+    /// H with unit information on the parameters that are not free, scaled to a unit diagonal; the scale; who is free.
+    fn scaled(&self, fit: &Fit) -> (Information, Parameters, [bool; PARAMETERS]) {
+        let mut h = self.information;
+        h.fill_lower_triangle_with_upper_triangle();
+        let free = free_parameters(fit, &self.prior);
+        let mut scale = Parameters::zeros();
+        for k in 0..PARAMETERS {
+            if !free[k] {
+                h.row_mut(k).fill(0.0);
+                h.column_mut(k).fill(0.0);
+                h[(k, k)] = 1.0;
+            }
+            scale[k] = if h[(k, k)] > 0.0 { 1.0 / h[(k, k)].sqrt() } else { 1.0 };
+        }
+        for k in 0..PARAMETERS {
+            for l in 0..PARAMETERS {
+                h[(k, l)] *= scale[k] * scale[l];
+            }
+        }
+        (h, scale, free)
+    }
+
+    /// The Gauss–Newton step; `None` where the equations don't fix it.
+    pub fn solve(&self, fit: &Fit) -> Option<Parameters> {
+        let (mut h, scale, free) = self.scaled(fit);
+        let mut g = self.gradient.component_mul(&scale);
+        for k in 0..PARAMETERS {
+            h[(k, k)] *= 1.0 + 1e-10;
+            if !free[k] {
+                g[k] = 0.0;
+            }
+        }
+        let step = -h.cholesky()?.solve(&g).component_mul(&scale);
+        step.iter().all(|s| s.is_finite()).then_some(step)
+    }
+
+    /// Covariance of the free parameters (zero rows elsewhere), and which are free.
+    pub fn covariance(&self, fit: &Fit) -> Option<(Information, [bool; PARAMETERS])> {
+        let (h, scale, free) = self.scaled(fit);
+        let mut covariance = h.cholesky()?.inverse();
+        for k in 0..PARAMETERS {
+            for l in 0..PARAMETERS {
+                covariance[(k, l)] *= if free[k] && free[l] { scale[k] * scale[l] } else { 0.0 };
+            }
+        }
+        Some((covariance, free))
+    }
+}
+
+/// Which parameters the fit estimates: parts that are there, and bias terms with a prior.
+///
+/// The depth scale can't be told from the silo's size: it is free only where the radius is known and seen.
+pub fn free_parameters(fit: &Fit, prior: &Information) -> [bool; PARAMETERS] {
+    let (cylinder, cone) = (fit.surface.radius.is_some(), fit.surface.cone.is_some());
+    let known = |k: usize| prior[(k, k)] > 0.0;
+    [true, true, true, true, cylinder, cone, cone, known(7), known(8) && known(4), known(9)]
+}

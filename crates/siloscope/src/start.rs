@@ -1,0 +1,283 @@
+//! Start values for the surface fit: cylinders and cones through random patches, scored by what else agrees with them.
+//!
+//! Two oriented patches fix a cylinder (its axis is the cross product of the normals, Eq. 3), three fix a cone. Each
+//! hypothesis is scored by the patches whose position and normal both agree; then the other part of the silo is looked
+//! for about the same axis.
+
+use crate::Vec3;
+use crate::pose::SiloPose;
+use crate::surface::{Cone, SiloSurface};
+use nalgebra::Matrix3;
+
+/// A patch as the start sees it: a point, its unit normal, and how sure they are.
+#[derive(Debug, Clone, Copy)]
+pub struct Oriented {
+    /// Position in the camera frame.
+    pub p: Vec3,
+    /// Unit normal towards the camera.
+    pub n: Vec3,
+    /// Tolerated angle between the normal and a model's, radians.
+    pub angle: f64,
+    /// Tolerated distance of the point from a model that adds to the model's own, metres.
+    pub slack: f64,
+}
+
+/// A start value with its score, the soft number of patches that agree.
+#[derive(Debug, Clone, Copy)]
+pub struct Start {
+    /// The surface.
+    pub surface: SiloSurface,
+    /// Whether the camera side of the wall is its inside.
+    pub inside: bool,
+    /// Soft count of agreeing patches.
+    pub score: f64,
+}
+
+/// Shape of one hypothesis about an axis through `a` along `x`.
+#[derive(Debug, Clone, Copy)]
+enum Shape {
+    Cylinder { radius: f64, inside: bool },
+    Cone { slope: f64 },
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Hypothesis {
+    x: Vec3,
+    a: Vec3,
+    shape: Shape,
+    score: f64,
+}
+
+/// Deterministic random numbers (SplitMix64): the same frame gives the same answer.
+struct Random(u64);
+
+impl Random {
+    fn below(&mut self, n: usize) -> usize {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        ((z ^ (z >> 31)) % n as u64) as usize
+    }
+}
+
+const TRIALS: usize = 1500;
+const SCORED: usize = 300;
+const KEPT: usize = 5;
+
+/// The best few distinct start values, best first; empty where nothing of revolution is found.
+pub fn starts(patches: &[Oriented]) -> Vec<Start> {
+    if patches.len() < 8 {
+        return Vec::new();
+    }
+    let mut random = Random(0x51_10);
+    let sample = thinned(patches, SCORED);
+    let mut kept: Vec<Hypothesis> = Vec::new();
+    for trial in 0..TRIALS {
+        let mut pick = || &patches[random.below(patches.len())];
+        let found = if trial % 5 < 2 { cylinder(pick(), pick()) } else { cone(pick(), pick(), pick()) };
+        let Some(mut hypothesis) = found else { continue };
+        let bar = kept.iter().map(|h| h.score).fold(0.0, f64::max);
+        hypothesis.score = score(&hypothesis, &sample, 0.3 * bar);
+        if hypothesis.score > 0.3 * bar && hypothesis.score > 0.0 {
+            keep(&mut kept, hypothesis);
+        }
+    }
+    let mut starts: Vec<Start> = kept.iter().flat_map(|h| complete(h, &sample)).collect();
+    starts.sort_by(|a, b| b.score.total_cmp(&a.score));
+    starts
+}
+
+fn thinned(patches: &[Oriented], n: usize) -> Vec<Oriented> {
+    if patches.len() <= n {
+        return patches.to_vec();
+    }
+    (0..n).map(|i| patches[i * patches.len() / n]).collect()
+}
+
+/// Keeps the best hypotheses that differ from each other.
+fn keep(kept: &mut Vec<Hypothesis>, new: Hypothesis) {
+    let same = |h: &Hypothesis| {
+        let across = (new.a - h.a) - h.x * (new.a - h.a).dot(&h.x);
+        std::mem::discriminant(&h.shape) == std::mem::discriminant(&new.shape)
+            && h.x.dot(&new.x).abs() > 0.996
+            && across.norm() < 0.03 * (h.a.norm() + new.a.norm()) + 0.02
+    };
+    if let Some(twin) = kept.iter_mut().find(|h| same(h)) {
+        if new.score > twin.score {
+            *twin = new;
+        }
+    } else {
+        kept.push(new);
+    }
+    kept.sort_by(|a, b| b.score.total_cmp(&a.score));
+    kept.truncate(KEPT);
+}
+
+fn cylinder(i: &Oriented, j: &Oriented) -> Option<Hypothesis> {
+    let cross = i.n.cross(&j.n);
+    let sine = cross.norm();
+    if sine < 0.17 {
+        return None;
+    }
+    let x = cross / sine * (if cross.z < 0.0 { -1.0 } else { 1.0 });
+    let between = j.p - i.p;
+    let signed_sine = i.n.cross(&j.n).dot(&x);
+    let (li, lj) = (between.cross(&j.n).dot(&x) / signed_sine, between.cross(&i.n).dot(&x) / signed_sine);
+    if li * lj <= 0.0 || (li - lj).abs() > 0.2 * li.abs().min(lj.abs()) {
+        return None;
+    }
+    let radius = (li + lj).abs() / 2.0;
+    let mean = (i.p + i.n * li + j.p + j.n * lj) / 2.0;
+    Some(Hypothesis { x, a: mean - x * mean.dot(&x), shape: Shape::Cylinder { radius, inside: li > 0.0 }, score: 0.0 })
+}
+
+fn cone(i: &Oriented, j: &Oriented, k: &Oriented) -> Option<Hypothesis> {
+    let normals = Matrix3::from_rows(&[i.n.transpose(), j.n.transpose(), k.n.transpose()]);
+    if normals.determinant().abs() < 0.02 {
+        return None;
+    }
+    let inverse = normals.try_inverse()?;
+    let a = inverse * Vec3::new(i.n.dot(&i.p), j.n.dot(&j.p), k.n.dot(&k.p));
+    let x = (inverse * Vec3::new(1.0, 1.0, 1.0)).normalize();
+    let x = if i.n.dot(&x) > 0.0 { -x } else { x }; // inner normals of a cone that opens upwards point up
+    let sine = -i.n.dot(&x);
+    let slope = sine / (1.0 - sine * sine).max(1e-12).sqrt();
+    let above = |o: &Oriented| (o.p - a).dot(&x) < 0.0;
+    if x.z <= 0.0 || !(0.08..2.7).contains(&slope) || !(above(i) && above(j) && above(k)) {
+        return None;
+    }
+    Some(Hypothesis { x, a, shape: Shape::Cone { slope }, score: 0.0 })
+}
+
+/// Soft count of the patches that agree; gives up early where `bar` can't be reached.
+fn score(h: &Hypothesis, sample: &[Oriented], bar: f64) -> f64 {
+    let mut total = 0.0;
+    for (i, o) in sample.iter().enumerate() {
+        total += agreement(h, o);
+        if i == sample.len() / 4 && total * 6.0 < bar {
+            return 0.0;
+        }
+    }
+    total
+}
+
+#[inline]
+fn agreement(h: &Hypothesis, o: &Oriented) -> f64 {
+    let v = o.p - h.a;
+    let z = v.dot(&h.x);
+    let radial = v - h.x * z;
+    let rho = radial.norm().max(1e-9);
+    let (distance, expected, scale) = match h.shape {
+        Shape::Cylinder { radius, inside } => (rho - radius, radial * (if inside { -1.0 } else { 1.0 } / rho), radius),
+        Shape::Cone { slope } => {
+            let c = 1.0 / (1.0 + slope * slope).sqrt();
+            ((rho + slope * z) * c, (radial / rho + h.x * slope) * -c, rho)
+        }
+    };
+    soft(distance, 0.04 * scale + o.slack, o.n.dot(&expected), o.angle)
+}
+
+/// 1 where distance and normal agree, falling to 0 at their tolerances.
+#[inline]
+fn soft(distance: f64, reach: f64, cosine: f64, angle: f64) -> f64 {
+    let d = distance / reach;
+    let a2 = 2.0 * (1.0 - cosine) / (angle * angle);
+    if d.abs() >= 1.0 || a2 >= 1.0 { 0.0 } else { (1.0 - d * d) * (1.0 - a2) }
+}
+
+/// The hypothesis as it is, and with the other part of the silo where patches ask for one.
+fn complete(h: &Hypothesis, sample: &[Oriented]) -> Vec<Start> {
+    let pose = SiloPose::from_axis(&h.x, &h.a);
+    let turn = pose.rotation();
+    let local: Vec<Oriented> = sample.iter().map(|o| Oriented { p: pose.to_silo(&o.p), n: turn * o.n, ..*o }).collect();
+    let alone = match h.shape {
+        Shape::Cylinder { radius, inside } => (SiloSurface { pose, radius: Some(radius), cone: None }, inside),
+        Shape::Cone { slope } => {
+            let apex = pose.to_silo(&h.a).z;
+            (SiloSurface { pose, radius: None, cone: Some(Cone { slope, apex }) }, true)
+        }
+    };
+    let mut found = vec![alone];
+    match h.shape {
+        Shape::Cylinder { inside: true, .. } => found.extend(best_cone(&alone.0, &local).map(|s| (s, true))),
+        Shape::Cone { .. } => found.extend(best_cylinder(&alone.0, &local).map(|s| (s, true))),
+        Shape::Cylinder { .. } => {}
+    }
+    found
+        .iter()
+        .map(|&(surface, inside)| Start { surface, inside, score: profile_score(&surface, inside, &local) })
+        .collect()
+}
+
+/// The surface with the part that it lacks, where patches (camera frame) ask for one.
+pub fn other_part(surface: &SiloSurface, patches: &[Oriented]) -> Option<SiloSurface> {
+    let local = in_silo(&surface.pose, &thinned(patches, 2 * SCORED));
+    if surface.cone.is_none() { best_cone(surface, &local) } else { best_cylinder(surface, &local) }
+}
+
+fn in_silo(pose: &SiloPose, patches: &[Oriented]) -> Vec<Oriented> {
+    let turn = pose.rotation();
+    patches.iter().map(|o| Oriented { p: pose.to_silo(&o.p), n: turn * o.n, ..*o }).collect()
+}
+
+/// Soft count of the patches (silo frame) that agree with a surface about the z-axis.
+fn profile_score(s: &SiloSurface, inside: bool, local: &[Oriented]) -> f64 {
+    local.iter().map(|o| profile_agreement(s, inside, o)).sum()
+}
+
+fn profile_agreement(s: &SiloSurface, inside: bool, o: &Oriented) -> f64 {
+    let rho = o.p.x.hypot(o.p.y).max(1e-9);
+    let n_rho = (o.n.x * o.p.x + o.n.y * o.p.y) / rho;
+    let side = if inside { -1.0 } else { 1.0 };
+    match (s.radius, s.cone) {
+        (Some(radius), cone) if cone.is_none() || o.p.z < s.cylinder_bottom() => {
+            soft(rho - radius, 0.04 * radius + o.slack, side * n_rho, o.angle)
+        }
+        (_, Some(cone)) => {
+            let c = 1.0 / (1.0 + cone.slope * cone.slope).sqrt();
+            let distance = (rho - cone.slope * (cone.apex - o.p.z)) * c;
+            soft(distance, 0.04 * rho + o.slack, -c * (n_rho + cone.slope * o.n.z), o.angle)
+        }
+        _ => 0.0,
+    }
+}
+
+/// Below a known cylinder, the cone that most patches agree with; each patch proposes one by its normal.
+fn best_cone(cylinder: &SiloSurface, local: &[Oriented]) -> Option<SiloSurface> {
+    let radius = cylinder.radius?;
+    let proposals = local.iter().step_by(3).filter_map(|o| {
+        let rho = o.p.x.hypot(o.p.y).max(1e-9);
+        let n_rho = (o.n.x * o.p.x + o.n.y * o.p.y) / rho;
+        let slope = o.n.z / n_rho;
+        let cone = Cone { slope, apex: o.p.z + rho / slope };
+        let meridian = n_rho.hypot(o.n.z) > 0.97;
+        let possible = n_rho < 0.0 && (0.1..2.7).contains(&slope) && rho < 0.97 * radius && meridian;
+        possible.then_some(SiloSurface { cone: Some(cone), ..*cylinder })
+    });
+    best(proposals, profile_score(cylinder, true, local), local)
+}
+
+/// Above a known cone, the cylinder that most patches agree with; each patch proposes its own radius.
+fn best_cylinder(cone: &SiloSurface, local: &[Oriented]) -> Option<SiloSurface> {
+    let proposals = local.iter().step_by(3).filter_map(|o| {
+        let rho = o.p.x.hypot(o.p.y).max(1e-9);
+        let n_rho = (o.n.x * o.p.x + o.n.y * o.p.y) / rho;
+        (n_rho < -0.97).then_some(SiloSurface { radius: Some(rho), ..*cone })
+    });
+    best(proposals, profile_score(cone, true, local), local)
+}
+
+/// The proposal with the best score, where it beats the score without it.
+fn best(proposals: impl Iterator<Item = SiloSurface>, bar: f64, local: &[Oriented]) -> Option<SiloSurface> {
+    let mut found = None;
+    let mut best = bar * 1.02 + 1.0;
+    for surface in proposals {
+        let score = profile_score(&surface, true, local);
+        if score > best {
+            best = score;
+            found = Some(surface);
+        }
+    }
+    found
+}

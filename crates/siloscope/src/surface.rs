@@ -1,0 +1,267 @@
+//! The silo's wall as a surface: a cylinder above a cone, its implicit functions, derivatives and ray intersections.
+//!
+//! In the silo frame, with ρ = √(x² + y²): the cylinder is ρ − R = 0 for z below `cylinder_bottom` in number, the cone
+//! is ρ − m·(z_a − z) = 0 from there to its apex z_a. Either may be missing. The gradient of both has a radial part of 1,
+//! so one residual formula serves both: the distance along a ray with direction q is F / (∇F·q).
+
+use crate::{SiloPose, Vec3};
+use nalgebra::{Matrix3, SMatrix, SVector};
+
+/// Number of parameters of the fit.
+pub const PARAMETERS: usize = 10;
+
+/// Order of the parameters: r_x, r_y, t_x, t_y, radius, cone slope, apex, and the depth bias (offset, scale, quadratic).
+pub type Parameters = SVector<f64, PARAMETERS>;
+
+/// Information or covariance over `Parameters`.
+pub type Information = SMatrix<f64, PARAMETERS, PARAMETERS>;
+
+/// Which part of the wall a point belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The cylinder.
+    Cylinder,
+    /// The cone.
+    Cone,
+}
+
+/// Cylinder and cone about one axis; a part that is not there is `None`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SiloSurface {
+    /// Camera in the silo.
+    pub pose: SiloPose,
+    /// Radius R of the cylinder, metres.
+    pub radius: Option<f64>,
+    /// The cone.
+    pub cone: Option<Cone>,
+}
+
+/// A cone that opens upwards: ρ = m·(z_a − z).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cone {
+    /// m, radius gained per metre of height.
+    pub slope: f64,
+    /// z_a of the vertex in the silo frame, metres.
+    pub apex: f64,
+}
+
+impl SiloSurface {
+    /// z where the cylinder meets the cone; infinite on the side of the missing part.
+    pub fn cylinder_bottom(&self) -> f64 {
+        match (self.radius, self.cone) {
+            (Some(radius), Some(cone)) => cone.apex - radius / cone.slope,
+            (Some(_), None) => f64::INFINITY,
+            _ => f64::NEG_INFINITY,
+        }
+    }
+
+    /// Adds a step of the fit; the depth bias is not part of the surface.
+    pub fn stepped(&self, step: &Parameters) -> Self {
+        Self {
+            pose: SiloPose {
+                r_x: self.pose.r_x + step[0],
+                r_y: self.pose.r_y + step[1],
+                t_x: self.pose.t_x + step[2],
+                t_y: self.pose.t_y + step[3],
+            },
+            radius: self.radius.map(|r| r + step[4]),
+            cone: self.cone.map(|c| Cone { slope: c.slope + step[5], apex: c.apex + step[6] }),
+        }
+    }
+}
+
+/// A surface with its rotation matrices worked out, for use on many points.
+#[derive(Debug, Clone)]
+pub struct PlacedSurface {
+    /// The surface.
+    pub surface: SiloSurface,
+    bottom: f64,
+    rotation: Matrix3<f64>,
+    d_rx: Matrix3<f64>,
+    d_ry: Matrix3<f64>,
+    /// −1 where the camera is inside (the usual case), +1 where it looks at the wall from outside.
+    root: f64,
+}
+
+/// A place on or near the wall: the implicit function there and its gradient.
+#[derive(Debug, Clone, Copy)]
+pub struct Local {
+    /// Which part.
+    pub part: Part,
+    /// The point in the silo frame.
+    pub p: Vec3,
+    /// Value of the implicit function F.
+    pub value: f64,
+    /// Gradient of F in the silo frame; its radial component is 1.
+    pub gradient: Vec3,
+}
+
+impl PlacedSurface {
+    /// Works out the matrices of a surface.
+    pub fn new(surface: SiloSurface) -> Self {
+        let SiloPose { r_x, r_y, t_x, t_y } = surface.pose;
+        let (sx, cx) = r_x.sin_cos();
+        let (sy, cy) = r_y.sin_cos();
+        let outside = surface.radius.is_some_and(|r| t_x.hypot(t_y) > r);
+        Self {
+            surface,
+            bottom: surface.cylinder_bottom(),
+            rotation: surface.pose.rotation(),
+            d_rx: Matrix3::new(0.0, cx * sy, -sx * sy, 0.0, -sx, -cx, 0.0, cx * cy, -sx * cy),
+            d_ry: Matrix3::new(-sy, sx * cy, cx * cy, 0.0, 0.0, 0.0, -cy, -sx * sy, -cx * sy),
+            root: if outside { 1.0 } else { -1.0 },
+        }
+    }
+
+    /// A direction from the camera frame to the silo frame.
+    #[inline]
+    pub fn turn(&self, direction: &Vec3) -> Vec3 {
+        self.rotation * direction
+    }
+
+    /// A point from the camera frame to the silo frame.
+    #[inline]
+    pub fn to_silo(&self, p: &Vec3) -> Vec3 {
+        let turned = self.rotation * p;
+        Vec3::new(turned.x + self.surface.pose.t_x, turned.y + self.surface.pose.t_y, turned.z)
+    }
+
+    /// z where the cylinder ends.
+    #[inline]
+    pub fn bottom(&self) -> f64 {
+        self.bottom
+    }
+
+    /// The implicit function at a point of the camera frame, of the part that is there at its height.
+    #[inline]
+    pub fn local(&self, p_camera: &Vec3) -> Local {
+        let p = self.to_silo(p_camera);
+        self.local_of(p, if p.z < self.bottom { Part::Cylinder } else { Part::Cone })
+    }
+
+    /// The implicit function of a given part at a point of the silo frame; the other part where that one is missing.
+    #[inline]
+    pub fn local_of(&self, p: Vec3, part: Part) -> Local {
+        let rho = p.x.hypot(p.y).max(1e-12);
+        let radial = (p.x / rho, p.y / rho);
+        match (part, self.surface.radius, self.surface.cone) {
+            (Part::Cone, _, Some(cone)) | (Part::Cylinder, None, Some(cone)) => Local {
+                part: Part::Cone,
+                p,
+                value: rho - cone.slope * (cone.apex - p.z),
+                gradient: Vec3::new(radial.0, radial.1, cone.slope),
+            },
+            (_, radius, _) => Local {
+                part: Part::Cylinder,
+                p,
+                value: rho - radius.unwrap_or(f64::NAN),
+                gradient: Vec3::new(radial.0, radial.1, 0.0),
+            },
+        }
+    }
+
+    /// Derivative of F at a point (camera frame and its `Local`) with respect to the first seven parameters.
+    #[inline]
+    pub fn derivative(&self, p_camera: &Vec3, at: &Local) -> [f64; 7] {
+        let g = &at.gradient;
+        let mut d = [g.dot(&(self.d_rx * p_camera)), g.dot(&(self.d_ry * p_camera)), g.x, g.y, 0.0, 0.0, 0.0];
+        match (at.part, self.surface.cone) {
+            (Part::Cone, Some(cone)) => {
+                d[5] = at.p.z - cone.apex;
+                d[6] = -cone.slope;
+            }
+            _ => d[4] = -1.0,
+        }
+        d
+    }
+
+    /// True depth at which the ray with direction `q` (camera frame, z = 1) meets the wall, and on which part.
+    ///
+    /// NaN where the ray misses.
+    #[inline]
+    pub fn depth(&self, q: &Vec3) -> (f64, Part) {
+        let q = self.rotation * q;
+        let (cylinder, cone) = (self.cylinder_depth(&q), self.cone_depth(&q));
+        if self.surface.cone.is_none() || cylinder * q.z < self.bottom {
+            (cylinder, Part::Cylinder)
+        } else {
+            (cone, Part::Cone)
+        }
+    }
+
+    #[inline]
+    fn cylinder_depth(&self, q: &Vec3) -> f64 {
+        let Some(radius) = self.surface.radius else { return f64::NAN };
+        let SiloPose { t_x, t_y, .. } = self.surface.pose;
+        let a = q.x * q.x + q.y * q.y;
+        let b = t_x * q.x + t_y * q.y;
+        let c = t_x * t_x + t_y * t_y - radius * radius;
+        (-b - self.root * (b * b - a * c).sqrt()) / a
+    }
+
+    #[inline]
+    fn cone_depth(&self, q: &Vec3) -> f64 {
+        let Some(cone) = self.surface.cone else { return f64::NAN };
+        let SiloPose { t_x, t_y, .. } = self.surface.pose;
+        let m2 = cone.slope * cone.slope;
+        let a = q.x * q.x + q.y * q.y - m2 * q.z * q.z;
+        let b = t_x * q.x + t_y * q.y + m2 * cone.apex * q.z;
+        let c = t_x * t_x + t_y * t_y - m2 * cone.apex * cone.apex;
+        -c / (b + (b * b - a * c).sqrt())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn silo(r_x: f64, r_y: f64, t_x: f64, t_y: f64) -> SiloSurface {
+        SiloSurface {
+            pose: SiloPose { r_x, r_y, t_x, t_y },
+            radius: Some(1.25),
+            cone: Some(Cone { slope: 0.8, apex: 5.0 }),
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn rays_end_on_the_wall(
+            r_x in -0.4..0.4f64, r_y in -0.4..0.4f64, t_x in -0.8..0.8f64, t_y in -0.8..0.8f64,
+            x in -0.5..0.5f64, y in -0.4..0.4f64,
+        ) {
+            let placed = PlacedSurface::new(silo(r_x, r_y, t_x, t_y));
+            let q = Vec3::new(x, y, 1.0);
+            let (d, part) = placed.depth(&q);
+            prop_assume!(d.is_finite());
+            let at = placed.local(&(q * d));
+            prop_assert!(d > 0.0 && at.part == part && at.value.abs() < 1e-9, "{d} {at:?}");
+        }
+
+        #[test]
+        fn derivatives_match_finite_differences(
+            r_x in -0.4..0.4f64, r_y in -0.4..0.4f64, t_x in -0.8..0.8f64, t_y in -0.8..0.8f64,
+            x in -0.5..0.5f64, y in -0.4..0.4f64,
+        ) {
+            let surface = silo(r_x, r_y, t_x, t_y);
+            let placed = PlacedSurface::new(surface);
+            let q = Vec3::new(x, y, 1.0);
+            let (d, part) = placed.depth(&q);
+            prop_assume!(d.is_finite());
+            let at = placed.local(&(q * d));
+            let along = at.gradient.dot(&placed.turn(&q));
+            prop_assume!(along.abs() > 1e-2);
+            let analytic = placed.derivative(&(q * d), &at);
+            let h = 1e-6;
+            for k in 0..7 {
+                let mut step = Parameters::zeros();
+                step[k] = h;
+                let above = PlacedSurface::new(surface.stepped(&step)).depth(&q);
+                let below = PlacedSurface::new(surface.stepped(&-step)).depth(&q);
+                prop_assume!(above.1 == part && below.1 == part);
+                let numeric = (above.0 - below.0) / (2.0 * h);
+                prop_assert!((numeric + analytic[k] / along).abs() < 1e-5 * (1.0 + numeric.abs()), "{k}: {numeric}");
+            }
+        }
+    }
+}
