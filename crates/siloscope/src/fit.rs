@@ -224,7 +224,8 @@ fn pixel_equations(
 ) -> Vec<(usize, Equation, f64)> {
     let placed = PlacedSurface::new(fit.surface);
     let tile = |i: usize| {
-        let equation = problem.equation(fit, &placed, i)?;
+        let (d, _) = placed.depth(&problem.patches.list[i].q);
+        let equation = problem.equation_at(fit, &placed, i, d)?;
         let reach = reach * 4.0 * fit.misfit / equation.cosine;
         let seen = tile_residual(image, problem.patches, i, &placed, &fit.bias, &problem.noise, (stride, reach));
         if !seen.pure || seen.count * ((stride * stride) as f64) < 0.5 * problem.patches.list[i].count {

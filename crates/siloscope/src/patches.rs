@@ -148,27 +148,51 @@ pub fn tile_side(width: usize) -> usize {
 pub fn tile_patches(image: &DepthImage, noise: Option<&NoiseLaw>) -> Patches {
     let side = tile_side(image.width);
     let (columns, rows) = (image.width / side, image.height / side);
-    let mut sums: Vec<Option<(Sums, Plane, f64)>> = Vec::with_capacity(columns * rows);
-    for row in 0..rows {
-        for column in 0..columns {
-            sums.push(tile(image, column * side, row * side, side, noise));
+    let place = |i: usize| ((i % columns) * side, (i / columns) * side);
+    let mut tiles: Vec<Option<Tile>> = (0..columns * rows).map(|i| tile(image, place(i), side)).collect();
+    let law = noise.copied().unwrap_or_else(|| noise_of(&tiles));
+    for (i, tile) in tiles.iter_mut().enumerate() {
+        if let Some(rough) = tile.filter(|t| t.scatter > 1.5 * law.sigma(t.depth()) + 3e-4 * t.depth()) {
+            *tile = Some(robust_tile(image, place(i), side).unwrap_or(rough));
         }
     }
     let mut patches = Patches { side, columns, ..Patches::default() };
     let mut index = vec![NONE; columns * rows];
-    for row in 0..rows {
-        for column in 0..columns {
-            if let Some(patch) = patch(image, &sums, (column, row), (columns, rows), side) {
-                index[row * columns + column] = patches.list.len() as u32;
-                patches.list.push(patch);
-            }
+    for (i, index) in index.iter_mut().enumerate() {
+        if let Some(patch) = patch(image, &tiles, (i % columns, i / columns), (columns, rows), side) {
+            *index = patches.list.len() as u32;
+            patches.list.push(patch);
         }
     }
     patches.neighbours = patches.list.iter().map(|p| neighbours(&index, p.tile, columns, rows)).collect();
     patches
 }
 
-fn tile(image: &DepthImage, u0: usize, v0: usize, side: usize, noise: Option<&NoiseLaw>) -> Option<(Sums, Plane, f64)> {
+fn noise_of(tiles: &[Option<Tile>]) -> NoiseLaw {
+    let mut samples: Vec<(f64, f64)> = tiles.iter().flatten().map(|t| (t.depth(), t.scatter)).collect();
+    noise_from_scatter(&mut samples, 1e-4)
+}
+
+/// A tile's sums, its plane, and the pixels' scatter about it.
+#[derive(Debug, Clone, Copy)]
+struct Tile {
+    sums: Sums,
+    plane: Plane,
+    scatter: f64,
+}
+
+impl Tile {
+    fn of(sums: Sums) -> Option<Self> {
+        let plane = sums.plane()?;
+        Some(Self { sums, plane, scatter: sums.scatter(&plane) })
+    }
+
+    fn depth(&self) -> f64 {
+        self.sums.z / self.sums.n
+    }
+}
+
+fn tile(image: &DepthImage, (u0, v0): (usize, usize), side: usize) -> Option<Tile> {
     let centre = (side as f64 - 1.0) / 2.0;
     let mut sums = Sums::default();
     for v in 0..side {
@@ -179,21 +203,11 @@ fn tile(image: &DepthImage, u0: usize, v0: usize, side: usize, noise: Option<&No
             }
         }
     }
-    if sums.n < 0.3 * (side * side) as f64 {
-        return None;
-    }
-    let plane = sums.plane()?;
-    let scatter = sums.scatter(&plane);
-    let depth = sums.z / sums.n;
-    let expected = noise.map_or(0.002 * depth, |law| 1.4 * law.sigma(depth) + 3e-4 * depth);
-    if scatter <= expected {
-        return Some((sums, plane, scatter));
-    }
-    Some(robust_tile(image, u0, v0, side).unwrap_or((sums, plane, scatter)))
+    if sums.n < 0.3 * (side * side) as f64 { None } else { Tile::of(sums) }
 }
 
 /// Plane through the tile's majority: a start from the medians of its quadrants, then inliers only.
-fn robust_tile(image: &DepthImage, u0: usize, v0: usize, side: usize) -> Option<(Sums, Plane, f64)> {
+fn robust_tile(image: &DepthImage, (u0, v0): (usize, usize), side: usize) -> Option<Tile> {
     let centre = (side as f64 - 1.0) / 2.0;
     let mut pixels = [(0.0f64, 0.0f64, 0.0f64); 256];
     let mut n = 0;
@@ -224,8 +238,9 @@ fn robust_tile(image: &DepthImage, u0: usize, v0: usize, side: usize) -> Option<
         if sums.n < 0.55 * n as f64 {
             return None;
         }
-        plane = sums.plane()?;
-        kept = Some((sums, plane, sums.scatter(&plane)));
+        let tile = Tile::of(sums)?;
+        plane = tile.plane;
+        kept = Some(tile);
     }
     kept
 }
@@ -251,15 +266,16 @@ fn quadrant_plane(pixels: &[(f64, f64, f64)]) -> Option<Plane> {
 /// The patch of one tile; its normal comes from the tile and those neighbours that continue its plane.
 fn patch(
     image: &DepthImage,
-    sums: &[Option<(Sums, Plane, f64)>],
+    tiles: &[Option<Tile>],
     (column, row): (usize, usize),
     (columns, rows): (usize, usize),
     side: usize,
 ) -> Option<Patch> {
-    let (own, plane, scatter) = sums[row * columns + column].as_ref()?;
-    let depth = own.z / own.n;
+    let tile = tiles[row * columns + column].as_ref()?;
+    let Tile { sums: own, plane, scatter } = *tile;
+    let depth = tile.depth();
     let step = side as f64;
-    let mut pooled = *own;
+    let mut pooled = own;
     let mut joined = 1;
     for dv in -1i64..=1 {
         for du in -1i64..=1 {
@@ -267,7 +283,7 @@ fn patch(
             if (du, dv) == (0, 0) || c < 0 || r < 0 || c >= columns as i64 || r >= rows as i64 {
                 continue;
             }
-            if let Some((other, _, _)) = &sums[r as usize * columns + c as usize] {
+            if let Some(Tile { sums: other, .. }) = &tiles[r as usize * columns + c as usize] {
                 let (u, v) = (du as f64 * step + other.u / other.n, dv as f64 * step + other.v / other.n);
                 let gap = other.z / other.n - plane.a - plane.b * u - plane.c * v;
                 if gap.abs() < 3.0 * scatter + 0.01 * depth {
@@ -296,7 +312,7 @@ fn patch(
         origin: Vec3::zeros(),
         normal,
         sigma_normal,
-        scatter: *scatter,
+        scatter,
         count: own.n,
         smooth: joined >= 3 && own.n >= 0.5 * step * step,
         tile: (column as u32, row as u32),

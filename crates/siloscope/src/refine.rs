@@ -78,9 +78,17 @@ const TUKEY: f64 = 4.7;
 impl Problem<'_> {
     /// The equation of patch `i`; `None` where its ray runs along the wall or it straddles the joint.
     pub fn equation(&self, fit: &Fit, placed: &PlacedSurface, i: usize) -> Option<Equation> {
+        let measured = self.patches.list[i].measured;
+        self.equation_at(fit, placed, i, if self.patches.cloud { 0.0 } else { fit.bias.true_depth(measured) })
+    }
+
+    /// The equation of patch `i` with its residual left at the distance of the depth `d` from the wall.
+    ///
+    /// With d on the wall, neither the derivative nor the variance depends on the noise of the patch itself. That
+    /// matters: a derivative that carries the residual's own noise pulls the answer along weakly determined directions.
+    pub fn equation_at(&self, fit: &Fit, placed: &PlacedSurface, i: usize, d: f64) -> Option<Equation> {
         let patch = &self.patches.list[i];
         let cloud = self.patches.cloud;
-        let d = if cloud { 0.0 } else { fit.bias.true_depth(patch.measured) };
         let p = patch.at(d);
         let at = placed.local(&p);
         let length = at.gradient.norm();
