@@ -58,7 +58,7 @@ fn surface_fit_image<'py>(
     };
     let image = DepthImage { width, height, rays, depth };
     let found = py.detach(|| fit_image(&image, &know));
-    found.map(|fit| result(py, &fit)).transpose()
+    found.ok().map(|fit| result(py, &fit)).transpose()
 }
 
 fn matrix<'py>(py: Python<'py>, m: &siloscope::surface::Information) -> PyResult<Bound<'py, PyArray2<f64>>> {

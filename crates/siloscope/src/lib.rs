@@ -5,11 +5,14 @@
 //! axis at the camera's height and z along gravity.
 
 pub mod camera;
+pub mod coarse;
+pub mod covariance;
 pub mod error;
 pub mod nearest;
 pub mod fit;
 pub mod patches;
 pub mod pixels;
+pub mod polish;
 pub mod pose;
 pub mod refine;
 pub mod sensor;

@@ -4,7 +4,7 @@
 //! (dust, edges). Everything up to the last step of the surface fit works on a few thousand patches, not pixels.
 
 use crate::Vec3;
-use crate::sensor::NoiseLaw;
+use crate::sensor::{DepthBias, NoiseLaw};
 
 /// A small piece of surface.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +17,10 @@ pub struct Patch {
     pub origin: Vec3,
     /// Unit normal towards the camera.
     pub normal: Vec3,
+    /// Change of the measured depth per pixel along the image's rows and columns (images).
+    pub slopes: [f64; 2],
+    /// Change of the ray per pixel along the image's rows and columns (images).
+    pub ray_steps: [Vec3; 2],
     /// Standard deviation of the normal's direction, radians.
     pub sigma_normal: f64,
     /// Scatter of the single measurements about the patch's plane, metres along `q`.
@@ -297,12 +301,7 @@ fn patch(
     let (mu, mv) = (own.u / own.n, own.v / own.n);
     let z = depth;
     let (q, q_u, q_v) = ray_and_steps(image, column * side, row * side, side, (mu, mv));
-    let normal = (q * wide.b + q_u * z).cross(&(q * wide.c + q_v * z));
-    let length = normal.norm();
-    if !(length > 0.0) {
-        return None;
-    }
-    let normal = normal * (if normal.dot(&q) > 0.0 { -1.0 } else { 1.0 } / length);
+    let (normal, length) = normal_of(&q, z, [wide.b, wide.c], &[q_u, q_v])?;
     let spread = (pooled.uu - pooled.u * pooled.u / pooled.n).min(pooled.vv - pooled.v * pooled.v / pooled.n);
     let sigma_slope = scatter / spread.max(1e-9).sqrt();
     let sigma_normal = sigma_slope * z * (q_u.norm() + q_v.norm()) / 1.4 / length;
@@ -311,12 +310,36 @@ fn patch(
         measured: z,
         origin: Vec3::zeros(),
         normal,
+        slopes: [wide.b, wide.c],
+        ray_steps: [q_u, q_v],
         sigma_normal,
         scatter,
         count: own.n,
         smooth: joined >= 3 && own.n >= 0.5 * step * step,
         tile: (column as u32, row as u32),
     })
+}
+
+/// Normal of the surface with depth z and slopes on ray q, towards the camera; and the length of the tangents' product.
+fn normal_of(q: &Vec3, z: f64, slopes: [f64; 2], steps: &[Vec3; 2]) -> Option<(Vec3, f64)> {
+    let normal = (q * slopes[0] + steps[0] * z).cross(&(q * slopes[1] + steps[1] * z));
+    let length = normal.norm();
+    let side = if normal.dot(q) > 0.0 { -1.0 } else { 1.0 };
+    (length > 0.0).then(|| (normal * (side / length), length))
+}
+
+impl Patches {
+    /// Works out the normals again for depths freed from their bias.
+    pub fn unbias_normals(&mut self, bias: &DepthBias) {
+        for patch in &mut self.list {
+            let d = bias.true_depth(patch.measured);
+            let slope = bias.slope(d);
+            let slopes = patch.slopes.map(|s| s / slope);
+            if let Some((normal, _)) = normal_of(&patch.q, d, slopes, &patch.ray_steps) {
+                patch.normal = normal;
+            }
+        }
+    }
 }
 
 /// Ray at the centroid (mu, mv) of a tile, and its change per pixel along u and v.

@@ -63,7 +63,11 @@ impl Random {
 
 const TRIALS: usize = 1500;
 const SCORED: usize = 300;
-const KEPT: usize = 5;
+const KEPT: usize = 6;
+/// Tolerated distance from a hypothesis, as a share of its radius.
+const REACH: f64 = 0.04;
+/// The same once the axis has been refined.
+const FINE_REACH: f64 = 0.015;
 
 /// The best few distinct start values, best first; empty where nothing of revolution is found.
 pub fn starts(patches: &[Oriented]) -> Vec<Start> {
@@ -71,6 +75,11 @@ pub fn starts(patches: &[Oriented]) -> Vec<Start> {
         return Vec::new();
     }
     let mut random = Random(0x51_10);
+    let curved = without_planes(patches, &mut random);
+    let patches = curved.as_slice();
+    if patches.len() < 8 {
+        return Vec::new();
+    }
     let sample = thinned(patches, SCORED);
     let mut kept: Vec<Hypothesis> = Vec::new();
     for trial in 0..TRIALS {
@@ -93,6 +102,26 @@ fn thinned(patches: &[Oriented], n: usize) -> Vec<Oriented> {
         return patches.to_vec();
     }
     (0..n).map(|i| patches[i * patches.len() / n]).collect()
+}
+
+/// Leaves out what lies on large planes: flat feed or flat walls would outvote a narrow strip of the silo's wall.
+fn without_planes(patches: &[Oriented], random: &mut Random) -> Vec<Oriented> {
+    const PLANE_TRIALS: usize = 40;
+    let mut rest = patches.to_vec();
+    while rest.len() >= 8 {
+        let sample = thinned(&rest, SCORED);
+        let on = |o: &Oriented, plane: &Oriented| {
+            let reach = 0.01 * plane.p.norm() + o.slack + plane.slack;
+            (o.p - plane.p).dot(&plane.n).abs() < reach && o.n.dot(&plane.n) > 0.99
+        };
+        let count = |plane: &Oriented| sample.iter().filter(|o| on(o, plane)).count();
+        let planes = (0..PLANE_TRIALS).map(|_| rest[random.below(rest.len())]).map(|p| (count(&p), p));
+        match planes.max_by_key(|(n, _)| *n) {
+            Some((n, plane)) if n * 4 > sample.len() => rest.retain(|o| !on(o, &plane)),
+            _ => break,
+        }
+    }
+    rest
 }
 
 /// Keeps the best hypotheses that differ from each other.
@@ -175,7 +204,7 @@ fn agreement(h: &Hypothesis, o: &Oriented) -> f64 {
             ((rho + slope * z) * c, (radial / rho + h.x * slope) * -c, rho)
         }
     };
-    soft(distance, 0.04 * scale + o.slack, o.n.dot(&expected), o.angle)
+    soft(distance, REACH * scale + o.slack, o.n.dot(&expected), o.angle)
 }
 
 /// 1 where distance and normal agree, falling to 0 at their tolerances.
@@ -200,20 +229,24 @@ fn complete(h: &Hypothesis, sample: &[Oriented]) -> Vec<Start> {
     };
     let mut found = vec![alone];
     match h.shape {
-        Shape::Cylinder { inside: true, .. } => found.extend(best_cone(&alone.0, &local).map(|s| (s, true))),
-        Shape::Cone { .. } => found.extend(best_cylinder(&alone.0, &local).map(|s| (s, true))),
+        Shape::Cylinder { inside: true, .. } => found.extend(best_cone(&alone.0, REACH, &local).map(|s| (s, true))),
+        Shape::Cone { .. } => found.extend(best_cylinder(&alone.0, REACH, &local).map(|s| (s, true))),
         Shape::Cylinder { .. } => {}
     }
     found
         .iter()
-        .map(|&(surface, inside)| Start { surface, inside, score: profile_score(&surface, inside, &local) })
+        .map(|&(surface, inside)| Start { surface, inside, score: profile_score(&surface, inside, REACH, &local) })
         .collect()
 }
 
 /// The surface with the part that it lacks, where patches (camera frame) ask for one.
 pub fn other_part(surface: &SiloSurface, patches: &[Oriented]) -> Option<SiloSurface> {
-    let local = in_silo(&surface.pose, &thinned(patches, 2 * SCORED));
-    if surface.cone.is_none() { best_cone(surface, &local) } else { best_cylinder(surface, &local) }
+    let local = in_silo(&surface.pose, &thinned(patches, 3 * SCORED));
+    if surface.cone.is_none() {
+        best_cone(surface, FINE_REACH, &local)
+    } else {
+        best_cylinder(surface, FINE_REACH, &local)
+    }
 }
 
 fn in_silo(pose: &SiloPose, patches: &[Oriented]) -> Vec<Oriented> {
@@ -222,31 +255,31 @@ fn in_silo(pose: &SiloPose, patches: &[Oriented]) -> Vec<Oriented> {
 }
 
 /// Soft count of the patches (silo frame) that agree with a surface about the z-axis.
-fn profile_score(s: &SiloSurface, inside: bool, local: &[Oriented]) -> f64 {
-    local.iter().map(|o| profile_agreement(s, inside, o)).sum()
+fn profile_score(s: &SiloSurface, inside: bool, reach: f64, local: &[Oriented]) -> f64 {
+    local.iter().map(|o| profile_agreement(s, inside, reach, o)).sum()
 }
 
-fn profile_agreement(s: &SiloSurface, inside: bool, o: &Oriented) -> f64 {
+fn profile_agreement(s: &SiloSurface, inside: bool, reach: f64, o: &Oriented) -> f64 {
     let rho = o.p.x.hypot(o.p.y).max(1e-9);
     let n_rho = (o.n.x * o.p.x + o.n.y * o.p.y) / rho;
     let side = if inside { -1.0 } else { 1.0 };
     match (s.radius, s.cone) {
         (Some(radius), cone) if cone.is_none() || o.p.z < s.cylinder_bottom() => {
-            soft(rho - radius, 0.04 * radius + o.slack, side * n_rho, o.angle)
+            soft(rho - radius, reach * radius + o.slack, side * n_rho, o.angle)
         }
         (_, Some(cone)) => {
             let c = 1.0 / (1.0 + cone.slope * cone.slope).sqrt();
             let distance = (rho - cone.slope * (cone.apex - o.p.z)) * c;
-            soft(distance, 0.04 * rho + o.slack, -c * (n_rho + cone.slope * o.n.z), o.angle)
+            soft(distance, reach * rho + o.slack, -c * (n_rho + cone.slope * o.n.z), o.angle)
         }
         _ => 0.0,
     }
 }
 
 /// Below a known cylinder, the cone that most patches agree with; each patch proposes one by its normal.
-fn best_cone(cylinder: &SiloSurface, local: &[Oriented]) -> Option<SiloSurface> {
+fn best_cone(cylinder: &SiloSurface, reach: f64, local: &[Oriented]) -> Option<SiloSurface> {
     let radius = cylinder.radius?;
-    let proposals = local.iter().step_by(3).filter_map(|o| {
+    let proposals = local.iter().filter_map(|o| {
         let rho = o.p.x.hypot(o.p.y).max(1e-9);
         let n_rho = (o.n.x * o.p.x + o.n.y * o.p.y) / rho;
         let slope = o.n.z / n_rho;
@@ -255,25 +288,27 @@ fn best_cone(cylinder: &SiloSurface, local: &[Oriented]) -> Option<SiloSurface> 
         let possible = n_rho < 0.0 && (0.1..2.7).contains(&slope) && rho < 0.97 * radius && meridian;
         possible.then_some(SiloSurface { cone: Some(cone), ..*cylinder })
     });
-    best(proposals, profile_score(cylinder, true, local), local)
+    best(proposals, profile_score(cylinder, true, reach, local), reach, local)
 }
 
 /// Above a known cone, the cylinder that most patches agree with; each patch proposes its own radius.
-fn best_cylinder(cone: &SiloSurface, local: &[Oriented]) -> Option<SiloSurface> {
-    let proposals = local.iter().step_by(3).filter_map(|o| {
+fn best_cylinder(cone: &SiloSurface, reach: f64, local: &[Oriented]) -> Option<SiloSurface> {
+    let proposals = local.iter().filter_map(|o| {
         let rho = o.p.x.hypot(o.p.y).max(1e-9);
         let n_rho = (o.n.x * o.p.x + o.n.y * o.p.y) / rho;
         (n_rho < -0.97).then_some(SiloSurface { radius: Some(rho), ..*cone })
     });
-    best(proposals, profile_score(cone, true, local), local)
+    best(proposals, profile_score(cone, true, reach, local), reach, local)
 }
 
 /// The proposal with the best score, where it beats the score without it.
-fn best(proposals: impl Iterator<Item = SiloSurface>, bar: f64, local: &[Oriented]) -> Option<SiloSurface> {
+fn best(proposals: impl Iterator<Item = SiloSurface>, bar: f64, reach: f64, local: &[Oriented]) -> Option<SiloSurface> {
+    const TRIED: usize = 60;
+    let proposals: Vec<SiloSurface> = proposals.collect();
     let mut found = None;
-    let mut best = bar * 1.02 + 1.0;
-    for surface in proposals {
-        let score = profile_score(&surface, true, local);
+    let mut best = bar + 3.0;
+    for &surface in proposals.iter().step_by(proposals.len().div_ceil(TRIED).max(1)) {
+        let score = profile_score(&surface, true, reach, local);
         if score > best {
             best = score;
             found = Some(surface);

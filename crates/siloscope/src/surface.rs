@@ -81,6 +81,11 @@ pub struct PlacedSurface {
     d_ry: Matrix3<f64>,
     /// −1 where the camera is inside (the usual case), +1 where it looks at the wall from outside.
     root: f64,
+    /// Constant terms of the ray equations: of the cylinder, and of the cone (m², m²·z_a, the rest).
+    cylinder_c: f64,
+    cone_m2: f64,
+    cone_b: f64,
+    cone_c: f64,
 }
 
 /// A place on or near the wall: the implicit function there and its gradient.
@@ -102,6 +107,7 @@ impl PlacedSurface {
         let SiloPose { r_x, r_y, t_x, t_y } = surface.pose;
         let (sx, cx) = r_x.sin_cos();
         let (sy, cy) = r_y.sin_cos();
+        let (m2, apex) = surface.cone.map_or((f64::NAN, f64::NAN), |c| (c.slope * c.slope, c.apex));
         let outside = surface.radius.is_some_and(|r| t_x.hypot(t_y) > r);
         Self {
             surface,
@@ -110,6 +116,10 @@ impl PlacedSurface {
             d_rx: Matrix3::new(0.0, cx * sy, -sx * sy, 0.0, -sx, -cx, 0.0, cx * cy, -sx * cy),
             d_ry: Matrix3::new(-sy, sx * cy, cx * cy, 0.0, 0.0, 0.0, -cy, -sx * sy, -cx * sy),
             root: if outside { 1.0 } else { -1.0 },
+            cylinder_c: surface.radius.map_or(f64::NAN, |r| t_x * t_x + t_y * t_y - r * r),
+            cone_m2: m2,
+            cone_b: m2 * apex,
+            cone_c: t_x * t_x + t_y * t_y - m2 * apex * apex,
         }
     }
 
@@ -180,34 +190,40 @@ impl PlacedSurface {
     /// NaN where the ray misses.
     #[inline]
     pub fn depth(&self, q: &Vec3) -> (f64, Part) {
-        let q = self.rotation * q;
-        let (cylinder, cone) = (self.cylinder_depth(&q), self.cone_depth(&q));
-        if self.surface.cone.is_none() || cylinder * q.z < self.bottom {
+        let ray = [q.x, q.y];
+        let cylinder = self.cylinder_depth(ray);
+        let down = self.rotation[(2, 0)] * q.x + self.rotation[(2, 1)] * q.y + self.rotation[(2, 2)];
+        if self.surface.cone.is_none() || cylinder * down < self.bottom {
             (cylinder, Part::Cylinder)
         } else {
-            (cone, Part::Cone)
+            (self.cone_depth(ray), Part::Cone)
         }
     }
 
+    /// True depth at which the ray `(x, y, 1)` of the camera frame meets the endless cylinder; NaN where it misses.
     #[inline]
-    fn cylinder_depth(&self, q: &Vec3) -> f64 {
-        let Some(radius) = self.surface.radius else { return f64::NAN };
+    pub fn cylinder_depth(&self, ray: [f64; 2]) -> f64 {
+        let q = self.turn_ray(ray);
         let SiloPose { t_x, t_y, .. } = self.surface.pose;
-        let a = q.x * q.x + q.y * q.y;
-        let b = t_x * q.x + t_y * q.y;
-        let c = t_x * t_x + t_y * t_y - radius * radius;
-        (-b - self.root * (b * b - a * c).sqrt()) / a
+        let a = q[0] * q[0] + q[1] * q[1];
+        let b = t_x * q[0] + t_y * q[1];
+        (-b - self.root * (b * b - a * self.cylinder_c).sqrt()) / a
+    }
+
+    /// True depth at which the ray `(x, y, 1)` of the camera frame meets the endless cone; NaN where it misses.
+    #[inline]
+    pub fn cone_depth(&self, ray: [f64; 2]) -> f64 {
+        let q = self.turn_ray(ray);
+        let SiloPose { t_x, t_y, .. } = self.surface.pose;
+        let a = q[0] * q[0] + q[1] * q[1] - self.cone_m2 * q[2] * q[2];
+        let b = t_x * q[0] + t_y * q[1] + self.cone_b * q[2];
+        -self.cone_c / (b + (b * b - a * self.cone_c).sqrt())
     }
 
     #[inline]
-    fn cone_depth(&self, q: &Vec3) -> f64 {
-        let Some(cone) = self.surface.cone else { return f64::NAN };
-        let SiloPose { t_x, t_y, .. } = self.surface.pose;
-        let m2 = cone.slope * cone.slope;
-        let a = q.x * q.x + q.y * q.y - m2 * q.z * q.z;
-        let b = t_x * q.x + t_y * q.y + m2 * cone.apex * q.z;
-        let c = t_x * t_x + t_y * t_y - m2 * cone.apex * cone.apex;
-        -c / (b + (b * b - a * c).sqrt())
+    fn turn_ray(&self, [x, y]: [f64; 2]) -> [f64; 3] {
+        let r = &self.rotation;
+        [0, 1, 2].map(|k| r[(k, 0)] * x + r[(k, 1)] * y + r[(k, 2)])
     }
 }
 

@@ -1,0 +1,146 @@
+//! From start values to a fit on patches that stands up to the evidence.
+
+use crate::fit::Refusal;
+use crate::patches::{NONE, Patches};
+use crate::refine::{Fit, Prior, Problem};
+use crate::sensor::{DepthBias, NoiseLaw};
+use crate::start::{Oriented, Start, other_part, starts};
+use crate::surface::PlacedSurface;
+use crate::verdict::{WallEvidence, wall_evidence};
+
+/// A cone that rises less than 36° could as well be feed lying at its angle of repose.
+const FEED_SLOPE: f64 = 1.376;
+
+/// Refines every start value on a few patches; the likeliest that stands up to the evidence is refined on more.
+///
+/// The depth scale stays fixed here: it trades against the silo's size along a curve on which Gauss–Newton steps crawl.
+/// A known radius then moves the answer along that curve exactly.
+pub fn coarse_fit(
+    patches: &mut Patches,
+    noise: NoiseLaw,
+    prior: &Prior,
+    pixel: f64,
+) -> Result<(Fit, WallEvidence), Refusal> {
+    let free_size = Prior { radius: prior.radius.filter(|_| prior.bias_std[1] == 0.0), ..prior.clone() };
+    let mut candidates = candidates(&Problem { patches, noise, prior: &free_size, pixel });
+    candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut refusal = Refusal::NoWall;
+    for (rank, (_, mut fit)) in candidates.into_iter().take(4).enumerate() {
+        Problem { patches, noise, prior: &free_size, pixel }.refine(&mut fit, 3, 4, 0.2);
+        if prior.bias_std[2] > 0.0 {
+            patches.unbias_normals(&fit.bias);
+        }
+        match settled(&Problem { patches, noise, prior: &free_size, pixel }, fit) {
+            Ok(found) => return Ok(found),
+            Err(why) if rank == 0 => refusal = why,
+            Err(_) => {}
+        }
+    }
+    Err(refusal)
+}
+
+/// Start values after a few steps, each with its likelihood.
+fn candidates(problem: &Problem) -> Vec<(f64, Fit)> {
+    let refined = |start: Start| {
+        let mut fit = Fit {
+            surface: start.surface,
+            bias: problem.prior.bias,
+            inside: start.inside,
+            misfit: 0.03 * start.surface.radius.unwrap_or(1.0),
+            weights: vec![0.0; problem.patches.list.len()],
+        };
+        problem.refine(&mut fit, 5, 6, 0.25);
+        (likelihood(problem, &fit), fit)
+    };
+    starts(&oriented(problem, &problem.prior.bias)).into_iter().take(5).map(refined).collect()
+}
+
+/// Refines a candidate on more patches and holds it against the evidence.
+fn settled(problem: &Problem, mut fit: Fit) -> Result<(Fit, WallEvidence), Refusal> {
+    if fit.surface.cone.is_none() != fit.surface.radius.is_none() && fit.inside {
+        fit = with_other_part(problem, fit);
+    }
+    problem.refine(&mut fit, 3, 2, 0.15);
+    if fit.surface.cone.is_some_and(|c| c.slope > FEED_SLOPE) {
+        if fit.surface.radius.is_none() {
+            return Err(Refusal::ConeMayBeFeed);
+        }
+        fit.surface.cone = None;
+        problem.refine(&mut fit, 3, 2, 0.15);
+    }
+    let wall = wall_patches(problem, &fit);
+    let evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
+    judge(&evidence, fit.inside).map(|()| (fit, evidence))
+}
+
+/// What has to hold on a wall of revolution.
+fn judge(e: &WallEvidence, inside: bool) -> Result<(), Refusal> {
+    if e.patches < 20 || e.arc < 0.5 {
+        return Err(Refusal::NoWall);
+    }
+    let turns = (e.turn - 1.0).abs() < 0.2 + 3.0 * e.turn_std.min(0.1);
+    if !turns {
+        return Err(Refusal::Flat);
+    }
+    let limit = if inside { 0.12 } else { 0.08 };
+    let straight = e.bend.abs() < limit + 3.0 * e.bend_std.min(0.1);
+    if !straight {
+        return Err(Refusal::Bent);
+    }
+    if e.behind > 0.05 {
+        return Err(Refusal::BehindWall);
+    }
+    Ok(())
+}
+
+/// Looks again for the part that is missing, now that the axis and the depth bias are known better.
+fn with_other_part(problem: &Problem, fit: Fit) -> Fit {
+    let before = likelihood(problem, &fit);
+    let Some(surface) = other_part(&fit.surface, &oriented(problem, &fit.bias)) else { return fit };
+    let mut both = Fit { surface, misfit: 0.01 * surface.radius.unwrap_or(1.0), ..fit.clone() };
+    problem.refine(&mut both, 4, 3, 0.2);
+    if likelihood(problem, &both) > before { both } else { fit }
+}
+
+fn oriented(problem: &Problem, bias: &DepthBias) -> Vec<Oriented> {
+    let usable = problem.patches.list.iter().filter(|p| p.smooth && p.sigma_normal < 0.3);
+    usable
+        .map(|p| {
+            let d = if problem.patches.cloud { 0.0 } else { bias.true_depth(p.measured) };
+            Oriented {
+                p: p.at(d),
+                n: p.normal,
+                angle: 0.2 + 3.0 * p.sigma_normal,
+                slack: 2.0 * p.scatter / p.count.sqrt(),
+            }
+        })
+        .filter(|o| o.p.x.is_finite() && o.p.z.is_finite())
+        .collect()
+}
+
+/// Log-likelihood gain of calling patches wall instead of anything else.
+fn likelihood(problem: &Problem, fit: &Fit) -> f64 {
+    let placed = PlacedSurface::new(fit.surface);
+    let gain = |(i, &weight): (usize, &f64)| {
+        let equation = if weight > 0.0 { problem.equation(fit, &placed, i) } else { None };
+        equation.map_or(0.0, |e| weight * (0.5 / (e.variance.sqrt() * e.cosine)).ln().max(0.0))
+    };
+    fit.weights.iter().enumerate().map(gain).sum()
+}
+
+/// Patches that agree with the wall and whose neighbours do too: the seam with feed or clutter is left out.
+pub fn wall_patches(problem: &Problem, fit: &Fit) -> Vec<bool> {
+    let placed = PlacedSurface::new(fit.surface);
+    let agrees: Vec<bool> = (0..problem.patches.list.len())
+        .map(|i| problem.equation(fit, &placed, i).is_some_and(|e| problem.weight(&e, i, 0.15) > 0.2))
+        .collect();
+    if problem.patches.cloud {
+        return agrees;
+    }
+    let seam = |i: usize| {
+        let near = &problem.patches.neighbours[i];
+        let foreign = near.iter().filter(|&&n| n != NONE && !agrees[n as usize]);
+        foreign.count() > 1
+    };
+    (0..agrees.len()).map(|i| agrees[i] && !seam(i)).collect()
+}

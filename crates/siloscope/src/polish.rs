@@ -1,0 +1,114 @@
+//! The last steps of the fit: residuals of pixels, not tiles, against the exact wall.
+
+use crate::patches::{DepthImage, noise_from_scatter};
+use crate::pixels::{Sampling, tile_residual};
+use crate::refine::{Equation, Fit, Problem, System, tukey};
+use crate::sensor::NoiseLaw;
+use crate::surface::{Parameters, PlacedSurface};
+
+/// The equation of one wall tile from its pixels.
+#[derive(Debug, Clone, Copy)]
+pub struct TileEquation {
+    /// Index of the patch.
+    pub patch: usize,
+    /// Its equation; the variance is that of the noise alone.
+    pub equation: Equation,
+    /// Scatter of the pixels about the tile's mean, metres.
+    pub scatter: f64,
+}
+
+/// One Gauss–Newton step on pixel residuals; returns the noise law, from the residuals themselves where none is known.
+pub fn polish(
+    problem: &Problem,
+    image: &DepthImage,
+    fit: &mut Fit,
+    wall: &[bool],
+    (stride, reach): (usize, f64),
+    known: Option<NoiseLaw>,
+) -> NoiseLaw {
+    let equations = pixel_equations(problem, image, fit, wall, (stride, reach));
+    let noise = known.unwrap_or_else(|| {
+        let sample = |e: &TileEquation| (problem.patches.list[e.patch].measured, e.scatter);
+        noise_from_scatter(&mut equations.iter().map(sample).collect::<Vec<_>>(), 1e-5)
+    });
+    solve_equations(problem, fit, &equations);
+    noise
+}
+
+/// Equations of the wall's tiles from every `stride`-th pixel; pixels further off than the noise and `reach` misfits
+/// allow don't count.
+pub fn pixel_equations(
+    problem: &Problem,
+    image: &DepthImage,
+    fit: &Fit,
+    wall: &[bool],
+    (stride, reach): (usize, f64),
+) -> Vec<TileEquation> {
+    let placed = PlacedSurface::new(fit.surface);
+    let tile = |patch: usize| {
+        let (d, _) = placed.depth(&problem.patches.list[patch].q);
+        let equation = problem.equation_at(fit, &placed, patch, d)?;
+        let count = problem.patches.list[patch].count;
+        let misfit = fit.misfit / equation.cosine;
+        let single = (equation.variance - misfit * misfit).max(0.0) * count;
+        let sampling = Sampling { stride, reach: 4.0 * (single.sqrt() + reach * misfit) };
+        let seen = tile_residual(image, problem.patches, patch, &placed, &fit.bias, sampling);
+        let enough = seen.count * ((stride * stride) as f64) >= 0.5 * count;
+        let equation = Equation { residual: seen.mean, variance: single / seen.count, ..equation };
+        enough.then_some(TileEquation { patch, equation, scatter: seen.scatter })
+    };
+    (0..wall.len()).filter(|&i| wall[i]).filter_map(tile).collect()
+}
+
+/// Robust solution of linear equations: reweighted a few times, the misfit re-estimated on the way.
+pub fn solve_equations(problem: &Problem, fit: &mut Fit, equations: &[TileEquation]) -> Option<(System, Parameters)> {
+    let mut total = Parameters::zeros();
+    let mut misfit = fit.misfit;
+    let mut system = System::with_prior(problem.prior, fit);
+    for _ in 0..4 {
+        system = System::with_prior(problem.prior, fit);
+        for tile in equations {
+            let moved = moved(&tile.equation, &total, misfit);
+            system.add(&moved, tukey(moved.residual * moved.residual / moved.variance));
+        }
+        // the residuals are already moved by `total`, the prior is not
+        system.gradient += system.prior * total;
+        let step = system.solve(fit)?;
+        total += step;
+        misfit = misfit_of(equations, &total);
+    }
+    fit.surface = fit.surface.stepped(&total);
+    fit.bias.offset += total[7];
+    fit.bias.scale += total[8];
+    fit.bias.quadratic += total[9];
+    fit.misfit = misfit;
+    Some((system, total))
+}
+
+/// The equation after a step, with the wall's misfit in its variance.
+pub fn moved(equation: &Equation, step: &Parameters, misfit: f64) -> Equation {
+    let across = misfit / equation.cosine;
+    Equation {
+        residual: equation.residual + equation.jacobian.dot(step),
+        variance: equation.variance + across * across,
+        ..*equation
+    }
+}
+
+/// Misfit across the wall that the tiles' residuals need beside their noise.
+fn misfit_of(equations: &[TileEquation], step: &Parameters) -> f64 {
+    let mut excess: Vec<f64> = Vec::with_capacity(equations.len());
+    let mut noise: Vec<f64> = Vec::with_capacity(equations.len());
+    for TileEquation { equation: e, .. } in equations {
+        let across = (e.residual + e.jacobian.dot(step)) * e.cosine;
+        excess.push(across.abs());
+        noise.push(e.variance * e.cosine * e.cosine);
+    }
+    if excess.is_empty() {
+        return 0.0;
+    }
+    let middle = excess.len() / 2;
+    let (_, &mut spread, _) = excess.select_nth_unstable_by(middle, f64::total_cmp);
+    let (_, &mut noise, _) = noise.select_nth_unstable_by(middle, f64::total_cmp);
+    ((1.4826 * spread).powi(2) - 1.2 * noise).max(0.0).sqrt().max(1e-6)
+}
