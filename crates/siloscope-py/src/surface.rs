@@ -6,6 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use siloscope::Vec3;
 use siloscope::fit::{Knowledge, SurfaceFit, fit_image};
+use siloscope::labels::{Labels, label_pixels};
 use siloscope::patches::DepthImage;
 use siloscope::sensor::{DepthBias, DepthError, NoiseLaw};
 use siloscope::surface::PARAMETERS;
@@ -31,9 +32,10 @@ fn depth_error(bias: Bias, bias_std: Bias, noise: Option<Noise>) -> DepthError {
 
 /// Fits the wall to a depth image: float32 depth (H, W) in metres and float64 rays (H, W, 2).
 ///
-/// Returns a dictionary of plain numbers and arrays, or None where nothing of revolution is found.
+/// Returns a dictionary of plain numbers and arrays; where there is no answer it holds only the reason, as `refusal`.
+/// With `labels` it also holds each pixel's label and what the labels cover.
 #[pyfunction]
-#[pyo3(signature = (depth, rays, bias, bias_std, noise=None, radius=None, gravity=None))]
+#[pyo3(signature = (depth, rays, bias, bias_std, noise=None, radius=None, gravity=None, labels=true))]
 #[allow(clippy::too_many_arguments)]
 fn surface_fit_image<'py>(
     py: Python<'py>,
@@ -44,7 +46,8 @@ fn surface_fit_image<'py>(
     noise: Option<Noise>,
     radius: Option<(f64, f64)>,
     gravity: Option<(f64, f64, f64, f64)>,
-) -> PyResult<Option<Bound<'py, PyDict>>> {
+    labels: bool,
+) -> PyResult<Bound<'py, PyDict>> {
     let (height, width) = (depth.shape()[0], depth.shape()[1]);
     if rays.shape() != [height, width, 2] {
         return Err(value_error(format!("rays have shape {:?}, the depth {:?}", rays.shape(), depth.shape())));
@@ -57,8 +60,31 @@ fn surface_fit_image<'py>(
         gravity: gravity.map(|(x, y, z, std)| (Vec3::new(x, y, z), std)),
     };
     let image = DepthImage { width, height, rays, depth };
-    let found = py.detach(|| fit_image(&image, &know));
-    found.ok().map(|fit| result(py, &fit)).transpose()
+    let found = py.detach(|| {
+        let found = fit_image(&image, &know);
+        let labels = found.as_ref().ok().filter(|_| labels).map(|fit| label_pixels(&image, fit));
+        found.map(|fit| (fit, labels))
+    });
+    match found {
+        Ok((fit, labels)) => {
+            let out = result(py, &fit)?;
+            if let Some(labels) = labels {
+                add_labels(py, &out, labels, (height, width))?;
+            }
+            Ok(out)
+        }
+        Err(refusal) => {
+            let out = PyDict::new(py);
+            out.set_item("refusal", refusal.slug())?;
+            Ok(out)
+        }
+    }
+}
+
+fn add_labels(py: Python<'_>, out: &Bound<'_, PyDict>, labels: Labels, shape: (usize, usize)) -> PyResult<()> {
+    out.set_item("labels", PyArray1::from_vec(py, labels.pixels).reshape([shape.0, shape.1])?)?;
+    out.set_item("pixel_counts", labels.counts)?;
+    out.set_item("areas", labels.areas)
 }
 
 fn matrix<'py>(py: Python<'py>, m: &siloscope::surface::Information) -> PyResult<Bound<'py, PyArray2<f64>>> {
@@ -81,6 +107,9 @@ fn result<'py>(py: Python<'py>, found: &SurfaceFit) -> PyResult<Bound<'py, PyDic
     out.set_item("information", matrix(py, &found.information)?)?;
     let n = found.noise;
     out.set_item("noise", (n.floor, n.constant, n.linear, n.quadratic, n.power_factor, n.power))?;
+    let points: Vec<f64> = found.patch_points().into_iter().flat_map(|p| [p.x, p.y, p.z]).collect();
+    out.set_item("points", PyArray1::from_vec(py, points).reshape([found.residuals.len(), 3])?)?;
+    out.set_item("residuals", PyArray1::from_slice(py, &found.residuals))?;
     let e = found.evidence;
     let evidence = PyDict::new(py);
     evidence.set_item("patches", e.patches)?;

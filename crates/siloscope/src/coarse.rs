@@ -22,15 +22,28 @@ pub fn coarse_fit(
     pixel: f64,
 ) -> Result<(Fit, WallEvidence), Refusal> {
     let free_size = Prior { radius: prior.radius.filter(|_| prior.bias_std[1] == 0.0), ..prior.clone() };
-    let mut candidates = candidates(&Problem { patches, noise, prior: &free_size, pixel });
+    let from_inside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, true);
+    best_settled(patches, noise, (&free_size, pixel), from_inside).or_else(|refusal| {
+        let from_outside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, false);
+        best_settled(patches, noise, (&free_size, pixel), from_outside).map_err(|_| refusal)
+    })
+}
+
+/// The likeliest candidate that stands up to the evidence, or why the likeliest does not.
+fn best_settled(
+    patches: &mut Patches,
+    noise: NoiseLaw,
+    (prior, pixel): (&Prior, f64),
+    mut candidates: Vec<(f64, Fit)>,
+) -> Result<(Fit, WallEvidence), Refusal> {
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut refusal = Refusal::NoWall;
     for (rank, (_, mut fit)) in candidates.into_iter().take(4).enumerate() {
-        Problem { patches, noise, prior: &free_size, pixel }.refine(&mut fit, 3, 4, 0.2);
+        Problem { patches, noise, prior, pixel }.refine(&mut fit, 3, 4, 0.2);
         if prior.bias_std[2] > 0.0 {
             patches.unbias_normals(&fit.bias);
         }
-        match settled(&Problem { patches, noise, prior: &free_size, pixel }, fit) {
+        match settled(&Problem { patches, noise, prior, pixel }, fit) {
             Ok(found) => return Ok(found),
             Err(why) if rank == 0 => refusal = why,
             Err(_) => {}
@@ -40,7 +53,7 @@ pub fn coarse_fit(
 }
 
 /// Start values after a few steps, each with its likelihood.
-fn candidates(problem: &Problem) -> Vec<(f64, Fit)> {
+fn candidates(problem: &Problem, inside: bool) -> Vec<(f64, Fit)> {
     let refined = |start: Start| {
         let mut fit = Fit {
             surface: start.surface,
@@ -52,7 +65,7 @@ fn candidates(problem: &Problem) -> Vec<(f64, Fit)> {
         problem.refine(&mut fit, 5, 6, 0.25);
         (likelihood(problem, &fit), fit)
     };
-    starts(&oriented(problem, &problem.prior.bias)).into_iter().take(5).map(refined).collect()
+    starts(&oriented(problem, &problem.prior.bias), inside).into_iter().take(5).map(refined).collect()
 }
 
 /// Refines a candidate on more patches and holds it against the evidence.

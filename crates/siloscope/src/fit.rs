@@ -65,6 +65,21 @@ pub enum Refusal {
     PoorlyDetermined,
 }
 
+impl Refusal {
+    /// Stable name of the reason.
+    pub fn slug(self) -> &'static str {
+        match self {
+            Self::NoDepth => "no-depth",
+            Self::NoWall => "no-wall",
+            Self::Flat => "flat-wall",
+            Self::Bent => "bent-wall",
+            Self::ConeMayBeFeed => "cone-may-be-feed",
+            Self::BehindWall => "behind-wall",
+            Self::PoorlyDetermined => "poorly-determined",
+        }
+    }
+}
+
 /// The first passes over the pixels take every fourth pixel of every fourth row.
 const POLISH_STRIDE: usize = 4;
 
@@ -94,7 +109,34 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Result<SurfaceFit, Ref
     clock.lap("covariance");
     result.timing = clock.laps;
     result.patches = patches;
-    Ok(result)
+    if result.is_determined(prior.bias_std[1]) { Ok(result) } else { Err(Refusal::PoorlyDetermined) }
+}
+
+/// Largest standard deviation of the axis' direction that still is an answer, radians.
+const MAX_DIRECTION_STD: f64 = 0.02;
+/// Largest standard deviation of the axis' position that still is an answer, as a share of the radius.
+const MAX_POSITION_STD: f64 = 0.05;
+
+impl SurfaceFit {
+    /// Centres of the patches in the silo frame, freed from the depth bias: what the r–z profile shows.
+    pub fn patch_points(&self) -> Vec<Vec3> {
+        let to_silo = |p: &crate::patches::Patch| {
+            let d = if self.patches.cloud { 0.0 } else { self.fit.bias.true_depth(p.measured) };
+            self.fit.surface.pose.to_silo(&p.at(d))
+        };
+        self.patches.list.iter().map(to_silo).collect()
+    }
+
+    /// Whether the pose is known well enough, apart from an unknown scale.
+    fn is_determined(&self, scale_std: f64) -> bool {
+        let surface = &self.fit.surface;
+        let size = surface.radius.or(surface.cone.map(|c| c.slope * c.apex)).unwrap_or(0.0);
+        let variance = |k: usize| self.covariance[(k, k)];
+        let scale = |t: f64| if self.free[8] { 0.0 } else { (t * scale_std).powi(2) };
+        let direction = (variance(0) + variance(1)).sqrt();
+        let position = (variance(2) - scale(surface.pose.t_x) + variance(3) - scale(surface.pose.t_y)).max(0.0).sqrt();
+        direction < MAX_DIRECTION_STD && position < MAX_POSITION_STD * size
+    }
 }
 
 fn noise(patches: &Patches, know: &Knowledge) -> NoiseLaw {

@@ -96,7 +96,7 @@ impl Problem<'_> {
         let along = at.gradient.dot(&q);
         let cosine = along / (length * q.norm());
         let size = self.pixel * self.patches.side as f64 * d / cosine.abs();
-        if !(cosine.abs() > 0.02) || (at.p.z - placed.bottom()).abs() < 0.5 * size {
+        if cosine.is_nan() || cosine.abs() < 0.02 || (at.p.z - placed.bottom()).abs() < 0.5 * size {
             return None;
         }
         let slope = if cloud { 1.0 } else { fit.bias.slope(d) };

@@ -48,6 +48,12 @@ struct Hypothesis {
     score: f64,
 }
 
+impl Hypothesis {
+    fn is_inside(&self) -> bool {
+        !matches!(self.shape, Shape::Cylinder { inside: false, .. })
+    }
+}
+
 /// Deterministic random numbers (SplitMix64): the same frame gives the same answer.
 struct Random(u64);
 
@@ -69,8 +75,8 @@ const REACH: f64 = 0.04;
 /// The same once the axis has been refined.
 const FINE_REACH: f64 = 0.015;
 
-/// The best few distinct start values, best first; empty where nothing of revolution is found.
-pub fn starts(patches: &[Oriented]) -> Vec<Start> {
+/// The best few distinct start values with the camera inside the silo, or outside a cylinder; best first.
+pub fn starts(patches: &[Oriented], from_inside: bool) -> Vec<Start> {
     if patches.len() < 8 {
         return Vec::new();
     }
@@ -84,7 +90,11 @@ pub fn starts(patches: &[Oriented]) -> Vec<Start> {
     let mut kept: Vec<Hypothesis> = Vec::new();
     for trial in 0..TRIALS {
         let mut pick = || &patches[random.below(patches.len())];
-        let found = if trial % 5 < 2 { cylinder(pick(), pick()) } else { cone(pick(), pick(), pick()) };
+        let found = if trial % 5 < 2 || !from_inside {
+            cylinder(pick(), pick()).filter(|h| h.is_inside() == from_inside)
+        } else {
+            cone(pick(), pick(), pick())
+        };
         let Some(mut hypothesis) = found else { continue };
         let bar = kept.iter().map(|h| h.score).fold(0.0, f64::max);
         hypothesis.score = score(&hypothesis, &sample, 0.3 * bar);
