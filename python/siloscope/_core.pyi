@@ -31,3 +31,14 @@ def check_sensor(sensor: Any) -> None: ...
 def nearest_distances(
     queries: NDArray[np.float64], reference: NDArray[np.float64], threads: int = 1
 ) -> NDArray[np.float64]: ...
+def surface_fit_image(
+    depth: NDArray[np.float32],
+    rays: NDArray[np.float64],
+    bias: tuple[float, float, float],
+    bias_std: tuple[float, float, float],
+    noise: tuple[float, float, float, float, float, float] | None = None,
+    radius: tuple[float, float] | None = None,
+    gravity: tuple[float, float, float, float] | None = None,
+    labels: bool = True,
+) -> dict[str, Any]: ...
+def surface_refusals() -> list[tuple[str, str, str]]: ...

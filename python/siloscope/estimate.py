@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.pose import SiloPose
+
+if TYPE_CHECKING:
+    from siloscope.surface import SurfaceDetails, SurfaceEvidence
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,10 @@ class Estimate:
     timing_ms: dict[str, float] = field(default_factory=dict)
     extra: dict[str, Any] = field(default_factory=dict)
     """Further keys of the JSON document, such as the gravity check."""
+    evidence: SurfaceEvidence | None = None
+    """What the frame says about every parameter, for fusing frames (method ``surface``)."""
+    details: SurfaceDetails | None = None
+    """Patches, residuals and labels, for pictures (method ``surface``)."""
 
     @property
     def ok(self) -> bool:

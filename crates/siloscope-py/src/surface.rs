@@ -8,6 +8,7 @@ use siloscope::Vec3;
 use siloscope::fit::{Knowledge, SurfaceFit, fit_image};
 use siloscope::labels::{Labels, label_pixels};
 use siloscope::patches::DepthImage;
+use siloscope::refusal::Refusal;
 use siloscope::sensor::{DepthBias, DepthError, NoiseLaw};
 use siloscope::surface::PARAMETERS;
 
@@ -129,6 +130,13 @@ fn result<'py>(py: Python<'py>, found: &SurfaceFit) -> PyResult<Bound<'py, PyDic
     Ok(out)
 }
 
+/// Every reason for which the surface fit refuses a frame: stable name, what it means, what to try.
+#[pyfunction]
+fn surface_refusals() -> Vec<(&'static str, &'static str, &'static str)> {
+    Refusal::ALL.into_iter().map(Refusal::row).collect()
+}
+
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(surface_fit_image, m)?)
+    m.add_function(wrap_pyfunction!(surface_fit_image, m)?)?;
+    m.add_function(wrap_pyfunction!(surface_refusals, m)?)
 }

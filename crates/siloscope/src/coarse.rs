@@ -1,8 +1,8 @@
 //! From start values to a fit on patches that stands up to the evidence.
 
-use crate::fit::Refusal;
 use crate::patches::{NONE, Patches};
 use crate::refine::{Fit, Prior, Problem};
+use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, NoiseLaw};
 use crate::start::{Oriented, Start, other_part, starts};
 use crate::surface::PlacedSurface;

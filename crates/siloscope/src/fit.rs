@@ -6,6 +6,7 @@ use crate::covariance::{scale_uncertainty, widened};
 use crate::patches::{DepthImage, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{TileEquation, moved, pixel_equations, polish, solve_equations};
 use crate::refine::{Equation, Fit, Prior, Problem, tukey};
+use crate::refusal::Refusal;
 use crate::sensor::{DepthError, NoiseLaw};
 use crate::surface::{Information, PARAMETERS};
 use crate::verdict::WallEvidence;
@@ -44,40 +45,6 @@ pub struct SurfaceFit {
     pub residuals: Vec<f64>,
     /// Milliseconds of each stage, in order.
     pub timing: Vec<(&'static str, f64)>,
-}
-
-/// Why a frame gives no answer.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Refusal {
-    /// Hardly any depth.
-    NoDepth,
-    /// No cylinder or cone agrees with enough of the frame.
-    NoWall,
-    /// What looks like wall does not turn about the axis: flat walls, a corner, a shaft.
-    Flat,
-    /// What looks like wall bends along its generatrix: a sphere, a heap.
-    Bent,
-    /// Only a cone as flat as feed lies.
-    ConeMayBeFeed,
-    /// Points lie where the wall would have to be in front of them.
-    BehindWall,
-    /// Wall, but too little of it to fix the pose.
-    PoorlyDetermined,
-}
-
-impl Refusal {
-    /// Stable name of the reason.
-    pub fn slug(self) -> &'static str {
-        match self {
-            Self::NoDepth => "no-depth",
-            Self::NoWall => "no-wall",
-            Self::Flat => "flat-wall",
-            Self::Bent => "bent-wall",
-            Self::ConeMayBeFeed => "cone-may-be-feed",
-            Self::BehindWall => "behind-wall",
-            Self::PoorlyDetermined => "poorly-determined",
-        }
-    }
 }
 
 /// The first passes over the pixels take every fourth pixel of every fourth row.
@@ -153,7 +120,7 @@ fn pixel_size(image: &DepthImage) -> f64 {
 
 fn prior(know: &Knowledge) -> Prior {
     let mut bias_std = know.error.bias_std;
-    if know.radius.is_some() && know.error.noise.is_none() {
+    if know.radius.is_some() && bias_std[1] > 0.0 {
         bias_std[1] = bias_std[1].max(0.05); // a known radius fixes the scale better than any expectation
     }
     Prior { bias: know.error.bias, bias_std, radius: know.radius, gravity: know.gravity }

@@ -16,6 +16,7 @@ pub mod pixels;
 pub mod polish;
 pub mod pose;
 pub mod refine;
+pub mod refusal;
 pub mod sensor;
 pub mod start;
 pub mod surface;

@@ -1,0 +1,79 @@
+//! Why a frame gives no answer: one table of reasons, each with what to try.
+
+/// Why a frame gives no answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Refusal {
+    /// Hardly any depth.
+    NoDepth,
+    /// No cylinder or cone agrees with enough of the frame.
+    NoWall,
+    /// What looks like wall does not turn about the axis: flat walls, a corner, a shaft.
+    Flat,
+    /// What looks like wall bends along its generatrix: a sphere, a heap.
+    Bent,
+    /// Only a cone as flat as feed lies.
+    ConeMayBeFeed,
+    /// Points lie where the wall would have to be in front of them.
+    BehindWall,
+    /// Wall, but too little of it to fix the pose.
+    PoorlyDetermined,
+}
+
+impl Refusal {
+    /// Every reason.
+    pub const ALL: [Self; 7] = [
+        Self::NoDepth,
+        Self::NoWall,
+        Self::Flat,
+        Self::Bent,
+        Self::ConeMayBeFeed,
+        Self::BehindWall,
+        Self::PoorlyDetermined,
+    ];
+
+    /// Stable name, what it means, and what to try.
+    pub fn row(self) -> (&'static str, &'static str, &'static str) {
+        match self {
+            Self::NoDepth => (
+                "no-depth",
+                "hardly any pixel of the frame has a depth",
+                "check the depth unit, the mask, the sensor's range, and its window for dirt",
+            ),
+            Self::NoWall => (
+                "no-wall",
+                "no cylinder or cone agrees with enough of the frame",
+                "wait until the level has fallen, or turn the camera so that more of the wall is in view",
+            ),
+            Self::Flat => (
+                "flat-wall",
+                "what could be wall is flat: its normals do not turn about an axis",
+                "check that the camera looks into a round silo, not at a room, a shaft or a plane",
+            ),
+            Self::Bent => (
+                "bent-wall",
+                "what could be wall bends along its height as well, as a sphere or a heap does",
+                "wait until more of the straight wall is in view, or mask what is not wall",
+            ),
+            Self::ConeMayBeFeed => (
+                "cone-may-be-feed",
+                "only a cone as flat as feed lies is in view; it may be the feed's own surface",
+                "wait until the level has fallen, or turn the camera so that cylinder wall is in view",
+            ),
+            Self::BehindWall => (
+                "behind-wall",
+                "many points lie behind the wall that was found, where nothing can be",
+                "mask what is not the silo, or check the camera file",
+            ),
+            Self::PoorlyDetermined => (
+                "poorly-determined",
+                "wall is in view, but too little of it to fix the axis",
+                "wait until the level has fallen, or turn the camera so that more of the wall is in view",
+            ),
+        }
+    }
+
+    /// Stable name of the reason.
+    pub fn slug(self) -> &'static str {
+        self.row().0
+    }
+}

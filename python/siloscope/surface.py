@@ -1,0 +1,193 @@
+"""Method ``surface``: cylinder and cone fitted to the wall, with the sensor's error taken into account."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope import _core
+from siloscope.camera import Camera
+from siloscope.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.pose import SiloPose
+from siloscope.sensors import SensorProfile
+
+PARAMETERS = ("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "apex", "offset", "scale", "quadratic")
+"""Order of the fit's parameters: pose; radius; cone (radius per metre of height, z of its vertex); depth bias."""
+
+DIAMETER_STD = 0.002
+"""Standard deviation of a tape-measured diameter, m."""
+
+GRAVITY_STD = 0.01
+"""Standard deviation of an accelerometer's direction at rest, rad (Table 7 of the paper: 5 to 12 mrad)."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceEvidence:
+    """What one frame says about all parameters, without priors: what `calibrate` fuses.
+
+    `parameters` (10,) in the order of `PARAMETERS` (NaN where not seen), `information` (10, 10) of this frame alone,
+    `free` (10,) which are estimated, `scale_std` the standard deviation of the depth scale that no frame can tell.
+    """
+
+    parameters: NDArray[np.float64]
+    information: NDArray[np.float64]
+    free: NDArray[np.bool_]
+    scale_std: float
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceDetails:
+    """What pictures show of a fit.
+
+    `points` (N, 3): patches in the silo frame; `residuals` (N,): their distance from the wall, NaN where a patch is not
+    wall; `labels` (H, W): 0 none, 1 cylinder, 2 cone, 3 feed, 4 other.
+    """
+
+    points: NDArray[np.float64]
+    residuals: NDArray[np.float64]
+    labels: NDArray[np.uint8] | None
+
+
+def fit_depth(
+    depth: NDArray[np.float32],
+    camera: Camera,
+    profile: SensorProfile,
+    *,
+    diameter: float | None = None,
+    diameter_std: float = DIAMETER_STD,
+    gravity: NDArray[np.float64] | None = None,
+    gravity_std: float = GRAVITY_STD,
+    config: dict[str, Any] | None = None,
+) -> Estimate:
+    """Fit the wall to a depth image.
+
+    Parameters
+    ----------
+    depth : float32 (H, W), C-contiguous
+        Measured depth z in metres; 0 or NaN where there is none.
+    camera : Camera
+        Intrinsics of the same size.
+    profile : SensorProfile
+        The sensor's depth error.
+    diameter, diameter_std : float, optional
+        Measured inner diameter of the silo's cylinder, m.
+    gravity : float (3,), optional
+        Direction of gravity in the camera frame, any length; used as a prior on the axis and reported against the
+        answer without it.
+    config : dict, optional
+        Effective settings to record in the estimate.
+    """
+    radius = None if diameter is None else (diameter / 2.0, diameter_std / 2.0)
+    pull = None
+    if gravity is not None:
+        pull = (float(gravity[0]), float(gravity[1]), float(gravity[2]), gravity_std)
+    found = _core.surface_fit_image(depth, camera.rays(), profile.bias, profile.bias_std, profile.noise, radius, pull)
+    if "refusal" in found:
+        return refused("surface", found["refusal"], config or {})
+    return _estimate(found, profile, config or {}, gravity)
+
+
+def refused(method: str, slug: str, config: dict[str, Any]) -> Estimate:
+    """An estimate without an answer; the message says what the reason means and what to try."""
+    meaning, advice = reasons()[slug]
+    message = f"{meaning[0].upper()}{meaning[1:]}; {advice}."
+    return Estimate("refused", method, reason=slug, message=message, config=config)
+
+
+def reasons() -> dict[str, tuple[str, str]]:
+    """Every reason for a refusal: what it means, and what to try."""
+    return {slug: (meaning, advice) for slug, meaning, advice in _core.surface_refusals()}
+
+
+def _estimate(
+    found: dict[str, Any], profile: SensorProfile, config: dict[str, Any], gravity: NDArray[np.float64] | None
+) -> Estimate:
+    pose = SiloPose(*found["pose"])
+    covariance = found["covariance"]
+    silo, silo_std = _geometry(found["radius"], found["cone"], covariance)
+    extra = {"sensor": _sensor(found, profile), "fit": _quality(found)}
+    if gravity is not None:
+        extra["gravity"] = _gravity_check(pose, gravity)
+    return Estimate(
+        "ok",
+        "surface",
+        pose=pose,
+        covariance=covariance[:4, :4].copy(),
+        silo=silo,
+        silo_std=silo_std,
+        pixel_ratios=_ratios(found["pixel_counts"]),
+        area_ratios=_ratios(found["areas"]),
+        config=config,
+        timing_ms={name.replace(" ", "_"): ms for name, ms in found["timing"]},
+        extra=extra,
+        evidence=_evidence(found, profile),
+        details=SurfaceDetails(found["points"], found["residuals"], found["labels"]),
+    )
+
+
+def _geometry(
+    radius: float | None, cone: tuple[float, float] | None, covariance: NDArray[np.float64]
+) -> tuple[SiloGeometry, SiloGeometry]:
+    """Geometry and its standard deviations from radius R, cone slope m and apex z_a; bottom = z_a − R/m."""
+    std = np.sqrt(np.diag(covariance))
+    r_std = None if radius is None else float(std[4])
+    if cone is None:
+        return SiloGeometry(radius=radius), SiloGeometry(radius=r_std)
+    slope, apex = cone
+    if radius is None:
+        return SiloGeometry(apex=apex), SiloGeometry(apex=float(std[6]))
+    jacobian = np.array([-1.0 / slope, radius / slope**2, 1.0])
+    bottom_std = float(np.sqrt(jacobian @ covariance[4:7, 4:7] @ jacobian))
+    return SiloGeometry(radius, apex - radius / slope, apex), SiloGeometry(r_std, bottom_std, float(std[6]))
+
+
+def _ratios(counts: Any) -> Ratios | None:
+    """Shares of cylinder, cone and feed among everything seen."""
+    seen = sum(counts[1:])
+    return Ratios(*(counts[k] / seen for k in (1, 2, 3))) if seen > 0 else None
+
+
+def _sensor(found: dict[str, Any], profile: SensorProfile) -> dict[str, Any]:
+    """The depth error that the answer rests on: given, or estimated with the pose."""
+    free = found["free"][7:]
+    std = np.sqrt(np.diag(found["covariance"]))[7:]
+    names = ("offset", "scale", "quadratic")
+    return {
+        "profile": profile.name,
+        "bias": dict(zip(names, found["bias"], strict=True)),
+        "bias_std": dict(zip(names, np.where(free, std, profile.bias_std).tolist(), strict=True)),
+        "bias_estimated": [n for n, f in zip(names, free, strict=True) if f],
+    }
+
+
+def _quality(found: dict[str, Any]) -> dict[str, Any]:
+    evidence = found["evidence"]
+    return {
+        "wall_patches": evidence["patches"],
+        "chi_square": found["chi_square"],
+        "misfit": found["misfit"],
+        "cone_slope": None if found["cone"] is None else found["cone"][0],
+        "seen_from": "inside" if found["inside"] else "outside",
+        "arc": evidence["arc"],
+        "turn": evidence["turn"],
+        "bend": evidence["bend"],
+    }
+
+
+def _gravity_check(pose: SiloPose, gravity: NDArray[np.float64]) -> dict[str, float]:
+    """The accelerometer's own angles beside the answer's (Table 7)."""
+    from_gravity = SiloPose.from_axis(gravity, np.zeros(3))
+    down = np.asarray(gravity, float) / np.linalg.norm(gravity)
+    angle = float(np.arccos(np.clip(down @ pose.axis_direction, -1.0, 1.0)))
+    return {"r_x": from_gravity.r_x, "r_y": from_gravity.r_y, "angle_to_axis": angle}
+
+
+def _evidence(found: dict[str, Any], profile: SensorProfile) -> SurfaceEvidence:
+    slope, apex = found["cone"] or (np.nan, np.nan)
+    radius = np.nan if found["radius"] is None else found["radius"]
+    parameters = np.array([*found["pose"], radius, slope, apex, *found["bias"]])
+    free = np.array(found["free"])
+    return SurfaceEvidence(parameters, found["information"], free, 0.0 if free[8] else profile.bias_std[1])

@@ -1,0 +1,78 @@
+"""The surface fit: laws, exact truth, and what must be refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from siloscope import Estimate, SiloPose, sensors
+from siloscope.paper import metrics
+from siloscope.paper.scenarios import scenario
+from siloscope.scene import ASTRA_S, Scene
+from siloscope.surface import fit_depth, reasons
+
+NAMES = ("silo1", "silo2", "silo3")
+
+
+def fit(scene: Scene, sensor: str | None, **known: float) -> Estimate:
+    depth = np.nan_to_num(scene.render().measured).astype(np.float32)
+    return fit_depth(depth, scene.camera, sensors.load(sensor), **known)
+
+
+def gap(estimate: Estimate, scene: Scene) -> float:
+    """PC average distance in mm (Eq. 11)."""
+    assert estimate.pose is not None, estimate.message
+    frame = scene.render()
+    return 1e3 * metrics.pc_average_distance(estimate.pose, scene.pose, frame.depth, scene.camera, stride=23)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_exact_frames_give_the_exact_pose_and_silo(name: str) -> None:
+    scene = scenario(name)
+    estimate = fit(scene, None)
+    assert estimate.pose is not None
+    assert gap(estimate, scene) < 1e-3
+    truth = scene.silo.geometry
+    assert estimate.silo.apex == pytest.approx(truth.apex, abs=1e-5)
+    assert estimate.silo.radius == pytest.approx(truth.radius, abs=1e-5)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_perturbed_frames_with_a_known_profile_are_within_the_noise(name: str) -> None:
+    scene = replace(scenario(name), sensor=ASTRA_S)
+    estimate = fit(scene, "orbbec-astra-s")
+    assert gap(estimate, scene) < 0.3
+    assert estimate.covariance is not None
+    truth, pose = scene.pose, estimate.pose
+    assert pose is not None
+    error = np.array([pose.r_x - truth.r_x, pose.r_y - truth.r_y, pose.t_x - truth.t_x, pose.t_y - truth.t_y])
+    assert error @ np.linalg.solve(estimate.covariance, error) < 18.5  # 99.9 % of a chi-square with 4 degrees
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_known_diameter_replaces_the_profile(name: str) -> None:
+    scene = replace(scenario(name), sensor=ASTRA_S)
+    assert gap(fit(scene, None, diameter=2 * scene.silo.radius), scene) < 2.0
+    assert gap(fit(scene, None), scene) < 30.0
+
+
+def test_every_reason_has_a_meaning_and_advice() -> None:
+    for slug, (meaning, advice) in reasons().items():
+        assert slug == slug.lower()
+        assert len(meaning) > 20
+        assert len(advice) > 20
+
+
+def test_a_gravity_prior_pulls_the_axis_by_its_weight() -> None:
+    scene = replace(scenario("silo1"), sensor=ASTRA_S)
+    depth = np.nan_to_num(scene.render().measured).astype(np.float32)
+    tilted = SiloPose(scene.pose.r_x + 0.01, scene.pose.r_y, 0, 0).axis_direction
+    free = fit_depth(depth, scene.camera, sensors.load("orbbec-astra-s"))
+    held = fit_depth(depth, scene.camera, sensors.load("orbbec-astra-s"), gravity=tilted, gravity_std=1e-7)
+    assert free.pose is not None
+    assert held.pose is not None
+    assert abs(free.pose.r_x - scene.pose.r_x) < 1e-4
+    assert held.pose.r_x - scene.pose.r_x == pytest.approx(0.01, abs=1e-3)
+    assert held.to_dict()["gravity"]["r_x"] == pytest.approx(scene.pose.r_x + 0.01, abs=1e-9)
