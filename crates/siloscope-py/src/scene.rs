@@ -3,8 +3,12 @@
 use crate::convert;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
+use siloscope::Vec3;
 use siloscope_scene::feed::{Base, Lumps, Shape};
-use siloscope_scene::{Exact, Feed, Rathole, Sensor, Silo, SiloWorld, World};
+use siloscope_scene::rooms::{Noise, Room, Sphere};
+use siloscope_scene::{
+    Bar, Bundle, Corrugation, Dent, Exact, Feed, Film, Rathole, Relief, Seams, Sensor, Silo, SiloWorld, Wall, World,
+};
 
 type Frame<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyArray2<f64>>);
 type Reading<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<bool>>);
@@ -148,8 +152,94 @@ fn pose(object: &Bound<'_, PyAny>) -> PyResult<siloscope::SiloPose> {
 
 fn world(scene: &Bound<'_, PyAny>) -> PyResult<Box<dyn World>> {
     let silo = silo(&scene.getattr("silo")?)?;
+    let (half, bottom, apex) = (silo.radius, silo.bottom(), silo.apex());
+    let kind: String = scene.getattr("world")?.extract()?;
+    Ok(match kind.as_str() {
+        "silo" => Box::new(silo_world(scene, silo)?),
+        "wall" => Box::new(Room::wall(apex)),
+        "corner" => Box::new(Room::corner(half, apex)),
+        "shaft" => Box::new(Room::shaft(half, bottom, apex)),
+        "sphere" => Box::new(Sphere { centre: Vec3::z() * (0.45 * apex), radius: 0.55 * apex }),
+        "noise" => Box::new(Noise { near: 0.1 * apex, far: apex, seed: seed(scene, "seed")? }),
+        "nothing" => Box::new(Room::default()),
+        other => return Err(convert::value_error(format!("unknown world '{other}'"))),
+    })
+}
+
+fn silo_world(scene: &Bound<'_, PyAny>, silo: Silo) -> PyResult<SiloWorld> {
     let feed = feed(&scene.getattr("feed")?, &silo)?;
-    Ok(Box::new(SiloWorld { silo, feed }))
+    let defects = scene.getattr("defects")?;
+    if defects.is_none() {
+        return Ok(SiloWorld { silo, wall: None, feed, clutter: vec![] });
+    }
+    let plan = defects.call_method1("resolved", (scene.getattr("silo")?,))?;
+    Ok(SiloWorld { wall: wall(&plan, &silo)?, clutter: clutter(&plan)?, silo, feed })
+}
+
+/// Reads the wall of a resolved `siloscope.scene.Defects`; None where it is perfect.
+fn wall(plan: &Bound<'_, PyAny>, silo: &Silo) -> PyResult<Option<Wall>> {
+    let relief = Relief {
+        radius: silo.radius,
+        bottom: silo.bottom(),
+        top: silo.top,
+        corrugation: corrugation(plan)?,
+        seams: seams(plan)?,
+        dents: dents(plan)?,
+        films: films(plan)?,
+    };
+    let ovality = number(plan, "ovality")?;
+    if relief.is_flat() && ovality == 0.0 {
+        return Ok(None);
+    }
+    let wall = Wall::new(silo, relief, ovality, number(plan, "ovality_azimuth")?);
+    wall.map(Some).map_err(convert::value_error)
+}
+
+fn corrugation(plan: &Bound<'_, PyAny>) -> PyResult<Option<Corrugation>> {
+    let depth = number(plan, "corrugation_depth")?;
+    let pitch = number(plan, "corrugation_pitch")?;
+    Ok((depth != 0.0).then_some(Corrugation { pitch, depth }))
+}
+
+fn seams(plan: &Bound<'_, PyAny>) -> PyResult<Option<Seams>> {
+    let seams = Seams {
+        spacing: number(plan, "seam_spacing")?,
+        uprights: whole(plan, "upright_seams")?,
+        height: number(plan, "seam_height")?,
+        half_width: 0.5 * number(plan, "seam_width")?,
+        bolts: whole(plan, "bolts")?,
+        bolt_height: number(plan, "bolt_height")?,
+        bolt_radius: number(plan, "bolt_radius")?,
+    };
+    Ok((seams.spacing != 0.0 || seams.uprights > 0).then_some(seams))
+}
+
+fn dents(plan: &Bound<'_, PyAny>) -> PyResult<Vec<Dent>> {
+    let rows: Vec<[f64; 4]> = plan.getattr("dents")?.extract()?;
+    Ok(rows.into_iter().map(|[azimuth, z, radius, height]| Dent { azimuth, z, radius, height }).collect())
+}
+
+fn films(plan: &Bound<'_, PyAny>) -> PyResult<Vec<Film>> {
+    let rows: Vec<[f64; 3]> = plan.getattr("film_bands")?.extract()?;
+    let (lobes, azimuth) = (whole(plan, "film_lobes")?, number(plan, "film_azimuth")?);
+    Ok(rows.into_iter().map(|[from, to, thickness]| Film { from, to, thickness, lobes, azimuth }).collect())
+}
+
+/// Bundles of bars, each `(x, y, z, x, y, z, radius)`.
+fn clutter(plan: &Bound<'_, PyAny>) -> PyResult<Vec<Bundle>> {
+    let bundles: Vec<Vec<[f64; 7]>> = plan.getattr("bundles")?.extract()?;
+    let bar = |[a, b, c, d, e, f, radius]: [f64; 7]| Bar { from: Vec3::new(a, b, c), to: Vec3::new(d, e, f), radius };
+    let bundle = |bars: Vec<[f64; 7]>| Bundle::new(bars.into_iter().map(bar).collect());
+    bundles.into_iter().map(bundle).collect::<Result<_, _>>().map_err(convert::value_error)
+}
+
+fn seed(object: &Bound<'_, PyAny>, name: &str) -> PyResult<u64> {
+    let message = || convert::value_error(format!("{name} must be a whole number between 0 and 2^64 - 1"));
+    object.getattr(name)?.extract().map_err(|_| message())
+}
+
+fn whole(object: &Bound<'_, PyAny>, name: &str) -> PyResult<u32> {
+    object.getattr(name)?.extract().map_err(|_| convert::value_error(format!("{name} must be a whole number")))
 }
 
 fn silo(object: &Bound<'_, PyAny>) -> PyResult<Silo> {
@@ -209,7 +299,7 @@ fn lumps(plan: &Bound<'_, PyAny>, radius: f64) -> PyResult<Option<Lumps>> {
     if height == 0.0 {
         return Ok(None);
     }
-    let seed = plan.getattr("seed")?.extract()?;
+    let seed = seed(plan, "seed")?;
     Lumps::new(height, number(plan, "lump_size")?, radius, seed).map(Some).map_err(convert::value_error)
 }
 
@@ -232,10 +322,16 @@ fn sensor(object: &Bound<'_, PyAny>) -> PyResult<Sensor> {
         incidence_gain: number(object, "incidence_gain")?,
         correlation: number(object, "correlation")?,
         correlation_length: number(object, "correlation_length")?,
+        warp: number(object, "warp")?,
+        warp_length: number(object, "warp_length")?,
+        warp_seed: seed(object, "warp_seed")?,
+        bowl: number(object, "bowl")?,
         min_range: number(object, "min_range")?,
         max_range: number(object, "max_range")?,
         max_incidence: number(object, "max_incidence")?,
         dropout: number(object, "dropout")?,
+        dropout_length: number(object, "dropout_length")?,
+        baseline: number(object, "baseline")?,
         flying: number(object, "flying")?,
         flying_step: number(object, "flying_step")?,
         dust: number(object, "dust")?,

@@ -2,7 +2,7 @@
 
 use crate::bounded;
 use crate::random::Stream;
-use crate::root::first_crossing;
+use crate::root::{Probe, first_crossing};
 use crate::silo::Silo;
 use crate::world::{Hit, Label};
 use siloscope::{Result, Vec3};
@@ -233,23 +233,29 @@ impl Feed {
         self.silo.apex() - self.height(p.x, p.y) - p.z
     }
 
-    /// First hit of a ray before `end`.
-    pub fn cast(&self, origin: &Vec3, ray: &Vec3, end: f64) -> Option<Hit> {
-        let lid = self.silo.apex() - self.level * self.silo.height() - 1e-6;
-        let start = if ray.z > 0.0 { ((lid - origin.z) / ray.z).max(0.0) } else { 0.0 };
-        if start >= end {
-            return None;
-        }
+    /// First hit of a ray between `start` and `end`.
+    pub fn cast(&self, origin: &Vec3, ray: &Vec3, start: f64, end: f64) -> Option<Hit> {
         let bend = self.bend * (ray.x * ray.x + ray.y * ray.y);
-        let t = first_crossing(|t| self.submersion(origin, ray, t), bend, start, end)?;
+        let t = first_crossing(|t| self.submersion(origin, ray, t, bend), start, end)?;
         Some(Hit { t, normal: self.normal(&(origin + ray * t)), label: Label::Feed })
     }
 
-    /// How deep the ray is below the surface at `t`, and the derivative.
-    fn submersion(&self, origin: &Vec3, ray: &Vec3, t: f64) -> (f64, f64) {
+    /// Parameter before which a ray inside a perfect silo is above all feed.
+    pub fn lid(&self, origin: &Vec3, ray: &Vec3) -> f64 {
+        let lid = self.silo.apex() - self.level * self.silo.height() - 1e-6;
+        if ray.z > 0.0 { ((lid - origin.z) / ray.z).max(0.0) } else { 0.0 }
+    }
+
+    /// How deep the ray is below the surface at `t`.
+    fn submersion(&self, origin: &Vec3, ray: &Vec3, t: f64, bend: f64) -> Probe {
         let p = origin + ray * t;
         let [height, along_x, along_y] = self.shape.jet(p.x, p.y);
-        (p.z - self.silo.apex() + self.offset + height, ray.z + along_x * ray.x + along_y * ray.y)
+        Probe {
+            value: p.z - self.silo.apex() + self.offset + height,
+            slope: ray.z + along_x * ray.x + along_y * ray.y,
+            bend,
+            reach: f64::INFINITY,
+        }
     }
 
     /// Unit normal of the surface, upwards.

@@ -4,20 +4,27 @@
 //! sensor model ([`Sensor`]) spoils the exact depths. Rays hit surfaces to the accuracy of float64; noise is drawn by
 //! pixel number, so that it does not depend on the number of threads.
 
+pub mod clutter;
 pub mod feed;
 pub mod random;
+pub mod relief;
 pub mod render;
+pub mod rooms;
 pub mod root;
 pub mod sensor;
 pub mod silo;
 pub mod volume;
+pub mod wall;
 pub mod world;
 
+pub use clutter::{Bar, Bundle};
 pub use feed::{Feed, Lumps, Rathole};
+pub use relief::{Corrugation, Dent, Film, Relief, Seams};
 pub use render::{Exact, render};
 pub use sensor::Sensor;
 pub use silo::Silo;
 pub use volume::Content;
+pub use wall::Wall;
 pub use world::{Hit, Label, SiloWorld, World};
 
 use siloscope::{Error, Result};

@@ -27,6 +27,15 @@ pub struct Sensor {
     pub correlation: f64,
     /// Reach of that common part, pixels.
     pub correlation_length: f64,
+    /// Lasting low-frequency warp: its standard deviation at 1 m depth; grows with the depth squared, as a stereo
+    /// sensor's does.
+    pub warp: f64,
+    /// Distance over which the warp changes, pixels.
+    pub warp_length: f64,
+    /// The unit whose warp it is.
+    pub warp_seed: u64,
+    /// Depth added at the image's corner, growing with the squared distance from the principal point (multipath).
+    pub bowl: f64,
     /// Nearest depth measured.
     pub min_range: f64,
     /// Farthest depth measured; infinite for no limit.
@@ -35,6 +44,11 @@ pub struct Sensor {
     pub max_incidence: f64,
     /// Share of pixels that give no measurement for no visible reason.
     pub dropout: f64,
+    /// Size of the patches in which they are lost, pixels; 0 for single pixels.
+    pub dropout_length: f64,
+    /// Distance from the projector or second imager, to the left; the band of the image that it does not see, `fx·baseline`
+    /// pixels at 1 m, gives no measurement.
+    pub baseline: f64,
     /// Share of pixels at depth edges that read a depth between the two sides.
     pub flying: f64,
     /// Relative depth step that makes an edge.
@@ -57,10 +71,16 @@ impl Default for Sensor {
             incidence_gain: 0.0,
             correlation: 0.0,
             correlation_length: 8.0,
+            warp: 0.0,
+            warp_length: 80.0,
+            warp_seed: 0,
+            bowl: 0.0,
             min_range: 0.0,
             max_range: f64::INFINITY,
             max_incidence: std::f64::consts::FRAC_PI_2,
             dropout: 0.0,
+            dropout_length: 0.0,
+            baseline: 0.0,
             flying: 0.0,
             flying_step: 0.03,
             dust: 0.0,
@@ -98,6 +118,11 @@ impl Sensor {
         bounded("noise_floor", self.noise_floor, 0.0, 1e3, "between 0 and 1000 m")?;
         bounded("incidence_gain", self.incidence_gain, 0.0, 1e3, "between 0 and 1000")?;
         bounded("correlation_length", self.correlation_length, 1.0, 1e4, "between 1 and 10000 pixels")?;
+        bounded("warp", self.warp, 0.0, 1.0, "between 0 and 1 m")?;
+        bounded("warp_length", self.warp_length, 1.0, 1e4, "between 1 and 10000 pixels")?;
+        bounded("bowl", self.bowl, -10.0, 10.0, "between -10 and 10 m")?;
+        bounded("dropout_length", self.dropout_length, 0.0, 1e4, "between 0 and 10000 pixels")?;
+        bounded("baseline", self.baseline, 0.0, 10.0, "between 0 and 10 m")?;
         bounded("min_range", self.min_range, 0.0, 1e3, "between 0 and 1000 m")?;
         bounded("max_range", self.max_range, self.min_range, f64::INFINITY, "at least min_range")?;
         let right = std::f64::consts::FRAC_PI_2;
@@ -165,6 +190,7 @@ enum Purpose {
     FlyingDepth,
     Dust,
     DustDepth,
+    Warp,
 }
 
 impl Pass<'_> {
@@ -186,7 +212,7 @@ impl Pass<'_> {
             Some(depth) => (depth, true),
             None => (surface, false),
         };
-        if true_depth <= 0.0 || self.happens(Purpose::Dropout, sensor.dropout, pixel) {
+        if true_depth <= 0.0 || self.is_lost(pixel, true_depth) {
             return NO_READING;
         }
         let angle = if false_return { 0.0 } else { self.incidence(pixel) };
@@ -205,7 +231,43 @@ impl Pass<'_> {
         let sensor = self.sensor;
         let sigma = sensor.sigma_at(d);
         let noise = if sigma > 0.0 { sigma * self.grazing_factor(angle) * self.unit_noise(pixel) } else { 0.0 };
-        d + sensor.bias_at(d) + noise
+        d + sensor.bias_at(d) + self.lasting_error(pixel, d) + noise
+    }
+
+    /// Warp and bowl: the same in every frame of a unit.
+    fn lasting_error(&self, pixel: usize, d: f64) -> f64 {
+        let sensor = self.sensor;
+        let mut error = 0.0;
+        if sensor.warp > 0.0 {
+            let stream = Stream::new(sensor.warp_seed, Purpose::Warp as u64);
+            error += sensor.warp * d * d * self.field(stream, sensor.warp_length, pixel);
+        }
+        if sensor.bowl != 0.0 {
+            let (u, v) = self.place(pixel);
+            let (cx, cy) = (self.camera.cx, self.camera.cy);
+            let corner =
+                cx.max(self.camera.width as f64 - 1.0 - cx).hypot(cy.max(self.camera.height as f64 - 1.0 - cy));
+            error += sensor.bowl * ((u - cx).powi(2) + (v - cy).powi(2)) / corner.powi(2).max(1e-12);
+        }
+        error
+    }
+
+    /// Lost for no visible reason, or in the band that the second imager does not see.
+    fn is_lost(&self, pixel: usize, depth: f64) -> bool {
+        let sensor = self.sensor;
+        if sensor.baseline > 0.0 && self.place(pixel).0 * depth < self.camera.fx * sensor.baseline {
+            return true;
+        }
+        if sensor.dropout == 0.0 || sensor.dropout_length == 0.0 {
+            return self.happens(Purpose::Dropout, sensor.dropout, pixel);
+        }
+        let field = self.field(self.stream(Purpose::Dropout), sensor.dropout_length, pixel);
+        normal_share(field) < sensor.dropout
+    }
+
+    /// Column and row.
+    fn place(&self, pixel: usize) -> (f64, f64) {
+        ((pixel % self.camera.width) as f64, (pixel / self.camera.width) as f64)
     }
 
     fn grazing_factor(&self, angle: f64) -> f64 {
@@ -223,12 +285,15 @@ impl Pass<'_> {
         if share == 0.0 { own } else { (1.0 - share).sqrt() * own + share.sqrt() * self.common_noise(pixel) }
     }
 
-    /// A B-spline over random values on a coarse lattice, scaled to variance 1 at every pixel.
     fn common_noise(&self, pixel: usize) -> f64 {
-        let pitch = self.sensor.correlation_length;
-        let (u, v) = ((pixel % self.camera.width) as f64 / pitch, (pixel / self.camera.width) as f64 / pitch);
+        self.field(self.stream(Purpose::Common), self.sensor.correlation_length, pixel)
+    }
+
+    /// A smooth random field: a B-spline over random values on a lattice, scaled to variance 1 at every pixel.
+    fn field(&self, stream: Stream, pitch: f64, pixel: usize) -> f64 {
+        let (u, v) = self.place(pixel);
+        let (u, v) = (u / pitch, v / pitch);
         let (wx, wy) = (spline(u.fract()), spline(v.fract()));
-        let stream = self.stream(Purpose::Common);
         let (mut sum, mut power) = (0.0, 0.0);
         for (j, wy) in wy.iter().enumerate() {
             for (i, wx) in wx.iter().enumerate() {
@@ -270,7 +335,8 @@ impl Pass<'_> {
         if self.sensor.incidence_gain == 0.0 && self.sensor.max_incidence >= std::f64::consts::FRAC_PI_2 {
             return 0.0;
         }
-        let [x, y] = self.camera.ray((pixel % self.camera.width) as f64, (pixel / self.camera.width) as f64);
+        let (u, v) = self.place(pixel);
+        let [x, y] = self.camera.ray(u, v);
         let n = self.exact.normals[pixel];
         let cosine = (n[0] * x + n[1] * y + n[2]).abs() / (x * x + y * y + 1.0).sqrt();
         cosine.min(1.0).acos()
@@ -288,4 +354,14 @@ impl Pass<'_> {
         let raw = (depth / self.sensor.unit).round();
         if (1.0..65535.0).contains(&raw) { raw * self.sensor.unit } else { 0.0 }
     }
+}
+
+/// Share of a standard normal law below `x`, to 1e-7 (Abramowitz and Stegun 7.1.26).
+fn normal_share(x: f64) -> f64 {
+    let z = x.abs() / std::f64::consts::SQRT_2;
+    let t = 1.0 / (1.0 + 0.327_591_1 * z);
+    let poly =
+        t * (0.254_829_592 + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429))));
+    let tail = 0.5 * poly * (-z * z).exp();
+    if x < 0.0 { tail } else { 1.0 - tail }
 }

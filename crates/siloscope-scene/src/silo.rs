@@ -45,7 +45,7 @@ impl Silo {
         bounded("outlet_length", self.outlet_length, 0.0, 1e3, "between 0 and 1000 m")?;
         let reach = self.outlet_offset[0].hypot(self.outlet_offset[1]) + self.outlet_radius;
         bounded("outlet_offset", reach, 0.0, 0.95 * self.radius, "such that the outlet lies within the silo")?;
-        bounded("top", self.apex(), 1e-3, 2e3, "such that the cone's vertex is below the camera")
+        bounded("top", self.bottom(), 0.0, 2e3, "such that the camera is not below the cylinder")
     }
 
     /// z where the cylinder ends and the cone begins.
@@ -99,14 +99,22 @@ impl Silo {
             }
         }
         if ray.z < 0.0 {
-            let t = (top - origin.z) / ray.z;
-            return Some(if self.roof { Exit::Surface(hit(t, Vec3::z(), Label::Other)) } else { Exit::Open(t) });
+            return self.top_exit(origin, ray);
         }
         let t = cone_exit(origin, ray, self.slope(), self.apex())?;
         let p = origin + ray * t;
         Some(Exit::Surface(
             self.outlet_hit(origin, ray, &p).unwrap_or_else(|| hit(t, self.cone_normal(&p), Label::Cone)),
         ))
+    }
+
+    /// Where a ray that looks up leaves through the top or meets the roof.
+    pub(crate) fn top_exit(&self, origin: &Vec3, ray: &Vec3) -> Option<Exit> {
+        if ray.z >= 0.0 {
+            return None;
+        }
+        let t = (self.top - origin.z) / ray.z;
+        Some(if self.roof { Exit::Surface(hit(t, Vec3::z(), Label::Other)) } else { Exit::Open(t) })
     }
 
     /// Unit normal of the cone at a point, towards the air.

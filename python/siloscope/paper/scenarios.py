@@ -78,4 +78,4 @@ def random_scene(
     misses = draw.uniform(-miss, miss, 2)
     t_x, t_y = distance * math.cos(azimuth), distance * math.sin(azimuth)
     pose = looking_at(silo, float(t_x), float(t_y), (float(misses[0]), float(misses[1])))
-    return Scene(silo, pose, camera, Feed() if feed is None else feed, sensor, seed)
+    return Scene(silo, pose, camera, Feed() if feed is None else feed, sensor, seed=seed)
