@@ -55,7 +55,9 @@ class StoredArray:
         return self._values(index * count, count).reshape(self.shape[1:])
 
     def parts_there(self) -> int:
-        """How many of the ``shape[0]`` parts are whole in the file."""
+        """How many of the ``shape[0]`` parts are whole in the file; all or none in Fortran's order."""
+        if self.fortran:
+            return self.shape[0] if self.nbytes <= self.size else 0
         each = math.prod(self.shape[1:]) * self.dtype.itemsize
         return min(self.shape[0], max(self.size, 0) // each) if each else 0
 

@@ -149,3 +149,9 @@ def numbers_in_text(name: str, text: bytes, rows: int, columns: int, what: str) 
             "the file was cut off or damaged, export it again"
         )
     return table
+
+
+def as_declared(column: NDArray[np.float64], dtype: str | np.dtype[Any]) -> NDArray[Any]:
+    """Numbers read from text in the floating-point type that the header declares; whole numbers stay float64."""
+    declared = np.dtype(dtype)
+    return column.astype(declared) if declared.kind == "f" else column

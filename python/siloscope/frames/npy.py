@@ -51,12 +51,11 @@ class ArraySource(FrameSource):
         if not self.stacked:
             yield Item(self.path.name, partial(self._frame, None))
             return
-        there = 1 if self.array.fortran else self.array.parts_there()
-        count = self.array.shape[0] if self.array.fortran else there
-        for index in range(count):
+        there = self._count()
+        for index in range(there):
             yield Item(f"frame {index}", partial(self._frame, index))
-        if count < self.array.shape[0]:
-            raise InputError(f"{self.name}: cut off after {there} of {self.array.shape[0]} frames")
+        if there < self.array.shape[0]:
+            raise InputError(f"{self.name}: cut off after {there} of {self.array.shape[0]} frames; save it again")
 
     def _frame(self, index: int | None) -> Frame:
         values = self._values(index).reshape(_image_shape(self.array.shape)[int(self.stacked) :])
@@ -74,7 +73,7 @@ class ArraySource(FrameSource):
         return self.labels[index] if stacked and self.labels is not None else self.labels
 
     def _count(self) -> int:
-        return self.array.shape[0] if self.stacked else 1
+        return self.array.parts_there() if self.stacked else 1
 
     def _streams(self) -> list[dict[str, Any]]:
         shape = _image_shape(self.array.shape)[int(self.stacked) :]

@@ -12,7 +12,7 @@ import numpy as np
 from siloscope import _core
 from siloscope.errors import InputError
 from siloscope.frame import Frame
-from siloscope.frames.clouds import CloudSource, Columns, cloud_frame, numbers_in_text
+from siloscope.frames.clouds import CloudSource, Columns, as_declared, cloud_frame, numbers_in_text
 from siloscope.frames.source import Format, Options, read_bytes
 
 _LONGEST_HEADER = 65_536
@@ -126,7 +126,10 @@ def _ascii(name: str, data: bytes, header: Header) -> Columns:
     count = sum(field.count for field in header.fields)
     table = numbers_in_text(name, data[header.size :], header.points, count, "points")
     starts = np.cumsum([0, *(field.count for field in header.fields)])
-    return {field.name: table[:, start] for field, start in zip(header.fields, starts, strict=False)}
+    return {
+        field.name: as_declared(table[:, start], field.dtype)
+        for field, start in zip(header.fields, starts, strict=False)
+    }
 
 
 def _binary(name: str, data: bytes, header: Header) -> Columns:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from siloscope.errors import InputError
 from siloscope.frame import Frame
-from siloscope.frames.clouds import CloudSource, Columns, cloud_frame, numbers_in_text
+from siloscope.frames.clouds import CloudSource, Columns, as_declared, cloud_frame, numbers_in_text
 from siloscope.frames.source import Format, Options, read_bytes
 
 _TYPES = {
@@ -124,7 +124,7 @@ def _ascii(name: str, data: bytes, header: Header) -> Columns:
     before = header.elements[: header.elements.index(vertices)]
     start = _after_lines(data, header.size, sum(element.count for element in before))
     table = numbers_in_text(name, data[start:], vertices.count, len(vertices.properties), "vertices")
-    return {key: table[:, i] for i, (key, _) in enumerate(vertices.properties)}
+    return {key: as_declared(table[:, i], str(kind)) for i, (key, kind) in enumerate(vertices.properties)}
 
 
 def _after_lines(data: bytes, start: int, lines: int) -> int:
