@@ -287,8 +287,8 @@ BAD_TIFF = {
     "colour": (colour_tiff(), "is a picture, not depth"),
     "header only": (b"II*\0", "damaged TIFF"),
     "cut": (made.tiff(made.RAW)[:2000], "damaged|TIFF"),
-    "bomb": (big_endian_tiff(19_000, 5_000, b"\0" * 64), "can't hold 19000 x 5000"),
-    "zstd": (made.tiff(made.RAW, "zstd"), "compression 'zstd'"),
+    "bomb": (big_endian_tiff(19_000, 5_000, b"\0" * 64), "can't hold the declared 190000000"),
+    "zstd": (made.tiff(made.RAW, "zstd"), "compression ZSTD"),
 }
 
 

@@ -204,8 +204,13 @@ class FrameSource(ABC):
             self.problems.append(str(error))
 
     def _finished(self, item: Item) -> Frame:
+        with np.errstate(all="ignore"):  # damaged values overflow; they end as no measurement
+            return finish(self._completed(item), self.options)
+
+    def _completed(self, item: Item) -> Frame:
+        """The frame as stored, with what the whole source knows about it."""
         frame = item.read()
-        frame = replace(
+        return replace(
             frame,
             camera=frame.camera or self.file_camera,
             depth_unit=self.file_depth_unit if frame.depth_unit is None else frame.depth_unit,
@@ -213,7 +218,6 @@ class FrameSource(ABC):
             source=self.name if self._count() == 1 else f"{self.name}, {item.label}",
             provenance={**self.provenance, "frame": item.label, **frame.provenance},
         )
-        return finish(frame, self.options)
 
     def _nothing_read(self) -> InputError:
         if not self.problems:

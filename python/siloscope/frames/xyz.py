@@ -20,8 +20,8 @@ from siloscope.frames.layout import Layout, is_number, layout
 from siloscope.frames.source import Format, FrameSource, Item, Options, check_image_size, read_bytes
 from siloscope.frames.terms import UnknownUnit
 
-_SAMPLE = 1000
-"""Lines looked at from either end to tell the columns."""
+_SAMPLE = 200
+"""Lines looked at from the start, the middle and the end to tell the columns."""
 
 _FORTRAN = re.compile(rb"(\d\.?)[dD]([+-]?\d)")
 
@@ -32,9 +32,9 @@ class TableSource(FrameSource):
     def __init__(self, path: Path, options: Options) -> None:
         super().__init__(path, "xyz", options)
         self._text = _text(path)
-        lines = self._text.decode("latin-1").split("\n")
-        self.layout = layout(self.name, lines if len(lines) <= 2 * _SAMPLE else lines[:_SAMPLE] + lines[-_SAMPLE:])
-        self._rows = sum(1 for line in lines[self.layout.first :] if line.strip())
+        lines = _sample(self._text)
+        self.layout = layout(self.name, lines)
+        self._rows = _filled_lines(self._text) - sum(1 for line in lines[: self.layout.first] if line)
         self._columns = len(lines[self.layout.first].split(self.layout.delimiter))
         if self.layout.columns is None:
             check_image_size(self.name, self._columns, self._rows)
@@ -76,6 +76,23 @@ def _text(path: Path) -> bytes:
     if b"\0" in text:
         raise InputError(f"{path}: bytes that are no text among the numbers; the file is damaged, export it again")
     return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def _sample(text: bytes) -> list[str]:
+    """All lines of a short text; of a long one some from its start, middle and end."""
+    lines = text.split(b"\n", _SAMPLE)
+    if len(lines) > _SAMPLE:
+        rest = lines.pop()
+        middle = rest[len(rest) // 2 :].split(b"\n", _SAMPLE)[1:_SAMPLE]
+        lines += middle + rest.rsplit(b"\n", _SAMPLE)[-_SAMPLE:]
+    return [line.decode("latin-1") for line in lines]
+
+
+def _filled_lines(text: bytes) -> int:
+    """How many lines are not empty."""
+    ends = np.frombuffer(text, np.uint8) == ord("\n")
+    filled = int(np.count_nonzero(ends[1:] & ~ends[:-1]))
+    return filled + (not text.endswith(b"\n"))
 
 
 def _numbers(name: str, text: bytes, known: Layout, columns: tuple[int, ...] | None) -> NDArray[np.float64]:

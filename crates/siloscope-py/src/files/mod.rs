@@ -1,0 +1,14 @@
+//! Decoders of file contents that would be slow in Python, or less safe in C.
+
+mod lzf;
+mod png;
+mod tiff;
+
+use pyo3::prelude::*;
+
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(png::decode_png16, m)?)?;
+    m.add_function(wrap_pyfunction!(lzf::decompress_lzf, m)?)?;
+    m.add_function(wrap_pyfunction!(tiff::tiff_pages, m)?)?;
+    m.add_function(wrap_pyfunction!(tiff::decode_tiff, m)?)
+}
