@@ -40,6 +40,9 @@ pub struct Rathole {
     pub depth: f64,
 }
 
+/// Radii beyond which exp(-(r/radius)⁴) is taken as 0: there it is below 1e-17.
+const RATHOLE_REACH: f64 = 2.51;
+
 /// Feed whose highest point is `level` of the silo's height above the vertex.
 #[derive(Debug, Clone)]
 pub struct Feed {
@@ -49,7 +52,7 @@ pub struct Feed {
     /// Height over the vertex that the shape's zero has.
     pub(crate) offset: f64,
     pub(crate) silo: Silo,
-    bend: f64,
+    steepness: f64,
 }
 
 /// The feed's shape, its zero anywhere.
@@ -90,6 +93,15 @@ impl Base {
                 let rounded = (x * x + y * y + tip * tip).sqrt();
                 [tangent * (rounded - tip), tangent * x / rounded, tangent * y / rounded]
             }
+        }
+    }
+
+    /// Bound of the slopes; the Gaussian's is 0.75·√2·exp(-1/2).
+    fn steepness(&self) -> f64 {
+        match *self {
+            Base::Flat => 0.0,
+            Base::Gaussian => 0.6434,
+            Base::Conical(tangent, _) => tangent.abs(),
         }
     }
 
@@ -137,6 +149,11 @@ impl Lumps {
         (cell as usize, s - cell)
     }
 
+    /// Bound of the slopes: the weights of f_x and of f_y add up to at most 1.5.
+    fn steepness(&self) -> f64 {
+        1.5 * std::f64::consts::SQRT_2 * self.height / self.pitch
+    }
+
     /// Bound of the second derivatives: the weights of f_xx add up to at most 4, those of f_xy to 2.25.
     fn bend(&self) -> f64 {
         6.25 * self.height / (self.pitch * self.pitch)
@@ -172,12 +189,22 @@ impl Rathole {
         let (dx, dy) = (x - self.centre[0], y - self.centre[1]);
         let w2 = self.radius * self.radius;
         let q = (dx * dx + dy * dy) / w2;
-        if q > 27.0 {
-            return [0.0; 3]; // exp(-27²) is 0 in float64
+        if q > RATHOLE_REACH * RATHOLE_REACH {
+            return [0.0; 3];
         }
         let drop = self.depth * (-q * q).exp();
         let slope = 4.0 * q * drop / w2;
         [-drop, slope * dx, slope * dy]
+    }
+
+    /// Distance from its axis beyond which it is not there.
+    fn reach(&self) -> f64 {
+        RATHOLE_REACH * self.radius
+    }
+
+    /// Bound of the slopes: 4 q^1.5 exp(-q²) stays below 1.53.
+    fn steepness(&self) -> f64 {
+        1.53 * self.depth / self.radius
     }
 
     /// Bound of the second derivatives: |16 q³ - 12 q| exp(-q²) stays below 3.4 and 4 q exp(-q²) below 1.72.
@@ -206,10 +233,20 @@ impl Shape {
         self.ratholes.iter().fold(add(add(base, plane), lumps), |sum, hole| add(sum, hole.jet(x, y)))
     }
 
-    /// Bound of the second derivatives.
-    pub fn bend(&self) -> f64 {
-        let holes: f64 = self.ratholes.iter().map(Rathole::bend).sum();
-        self.base.bend(self.radius) + self.lumps.as_ref().map_or(0.0, Lumps::bend) + holes
+    /// Bound of the second derivatives around a place, and the radius around it in which the bound holds.
+    pub fn bend_around(&self, x: f64, y: f64) -> (f64, f64) {
+        let smooth = self.base.bend(self.radius) + self.lumps.as_ref().map_or(0.0, Lumps::bend);
+        self.ratholes.iter().fold((smooth, f64::INFINITY), |(bend, radius), hole| {
+            let away = (x - hole.centre[0]).hypot(y - hole.centre[1]) - hole.reach();
+            if away > 0.1 * hole.radius { (bend, radius.min(away)) } else { (bend + hole.bend(), radius) }
+        })
+    }
+
+    /// Bound of the slopes.
+    pub fn steepness(&self) -> f64 {
+        let holes: f64 = self.ratholes.iter().map(Rathole::steepness).sum();
+        let lumps = self.lumps.as_ref().map_or(0.0, Lumps::steepness);
+        self.base.steepness() + self.tilt[0].hypot(self.tilt[1]) + lumps + holes
     }
 }
 
@@ -219,8 +256,8 @@ impl Feed {
         bounded("level", level, 0.0, 1.0, "between 0 and 1, as a share of the silo's height")?;
         shape.validate()?;
         let offset = highest_offset(silo, &shape, level * silo.height());
-        let bend = shape.bend();
-        Ok(Self { level, shape, offset, silo: silo.clone(), bend })
+        let steepness = shape.steepness();
+        Ok(Self { level, shape, offset, silo: silo.clone(), steepness })
     }
 
     /// Height of the feed surface over the vertex, which may lie below the cone.
@@ -235,26 +272,27 @@ impl Feed {
 
     /// First hit of a ray between `start` and `end`.
     pub fn cast(&self, origin: &Vec3, ray: &Vec3, start: f64, end: f64) -> Option<Hit> {
-        let bend = self.bend * (ray.x * ray.x + ray.y * ray.y);
-        let t = first_crossing(|t| self.submersion(origin, ray, t, bend), start, end)?;
+        let t = first_crossing(|t| self.submersion(origin, ray, t), start, end)?;
         Some(Hit { t, normal: self.normal(&(origin + ray * t)), label: Label::Feed })
     }
 
-    /// Parameter before which a ray inside a perfect silo is above all feed.
-    pub fn lid(&self, origin: &Vec3, ray: &Vec3) -> f64 {
-        let lid = self.silo.apex() - self.level * self.silo.height() - 1e-6;
+    /// Parameter before which a ray inside the silo is above all feed; walls may bulge by `bulge`.
+    pub fn lid(&self, origin: &Vec3, ray: &Vec3, bulge: f64) -> f64 {
+        let lid = self.silo.apex() - self.level * self.silo.height() - 1e-6 - bulge * self.steepness;
         if ray.z > 0.0 { ((lid - origin.z) / ray.z).max(0.0) } else { 0.0 }
     }
 
     /// How deep the ray is below the surface at `t`.
-    fn submersion(&self, origin: &Vec3, ray: &Vec3, t: f64, bend: f64) -> Probe {
+    fn submersion(&self, origin: &Vec3, ray: &Vec3, t: f64) -> Probe {
         let p = origin + ray * t;
         let [height, along_x, along_y] = self.shape.jet(p.x, p.y);
+        let speed = ray.x.hypot(ray.y);
+        let (bend, radius) = self.shape.bend_around(p.x, p.y);
         Probe {
             value: p.z - self.silo.apex() + self.offset + height,
             slope: ray.z + along_x * ray.x + along_y * ray.y,
-            bend,
-            reach: f64::INFINITY,
+            bend: bend * speed * speed,
+            reach: radius / speed, // infinite straight down
         }
     }
 

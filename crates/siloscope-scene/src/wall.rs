@@ -63,6 +63,11 @@ impl Wall {
         self.silo.radius * self.free_share(Zone::Cylinder).min(self.free_share(Zone::Cone))
     }
 
+    /// How far the wall reaches beyond the perfect one.
+    pub fn bulge(&self) -> f64 {
+        self.ovality * self.silo.radius + self.limits[0].outwards.max(self.limits[1].outwards)
+    }
+
     /// First hit on cylinder or cone for a ray that starts in the silo's air.
     pub fn cast(&self, origin: &Vec3, ray: &Vec3) -> Option<Hit> {
         let at_height = |z: f64| (z - origin.z) / ray.z;

@@ -101,11 +101,10 @@ impl SiloWorld {
         }
     }
 
-    /// Where the wall is perfect, no feed stands above the level and the way down to it is skipped.
     fn cast_feed(&self, from: &Vec3, ray: &Vec3, end: f64) -> Option<Hit> {
         let feed = self.feed.as_ref()?;
-        let start = if self.wall.is_none() { feed.lid(from, ray) } else { 0.0 };
-        feed.cast(from, ray, start, end)
+        let bulge = self.wall.as_ref().map_or(0.0, Wall::bulge);
+        feed.cast(from, ray, feed.lid(from, ray, bulge), end)
     }
 }
 
