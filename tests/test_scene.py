@@ -34,7 +34,7 @@ def gaussian_height(scene: Scene, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     return top - 0.75 * radius * (1 - np.exp(-(x**2 + y**2) / radius**2))
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
+@pytest.mark.parametrize("name", [name for name in SCENARIOS if name.startswith("silo")])
 def test_every_ray_ends_on_the_surface_its_label_names(name: str) -> None:
     scene = small(scenario(name))
     frame = scene.render()

@@ -29,7 +29,9 @@ class Command(NamedTuple):
     """The line in ``siloscope --help``."""
 
 
-COMMANDS: tuple[Command, ...] = ()
+COMMANDS: tuple[Command, ...] = (
+    Command("simulate", "simulate:simulate", "Write depth frames of a simulated silo, with their exact truth."),
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

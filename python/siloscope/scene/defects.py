@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -118,6 +119,32 @@ class Defects:
         places = np.stack([distances * np.cos(azimuths), distances * np.sin(azimuths)], axis=-1)
         end = silo.top + 0.9 * silo.cylinder_height
         return [(*place, silo.top, *foot, end, 0.004) for place, foot in zip(places, places + drifts, strict=True)]
+
+
+DEFECTS: dict[str, dict[str, Any]] = {
+    "corrugated": {"corrugation_depth": 0.013},
+    "oval": {"ovality": 0.01, "ovality_azimuth": 0.5},
+    "seams": {"seam_spacing": 1.0, "upright_seams": 5, "bolts": 40},
+    "dents": {"dents": 12},
+    "film": {"film_bands": ((0.6, 1.2, 0.03), (1.8, 2.3, 0.05)), "film_lobes": 2},
+    "ladder": {"ladder": True},
+    "cables": {"cables": 4},
+    "auger": {"auger": True},
+}
+"""Usual sizes of each defect by name."""
+
+
+def defects(names: str, seed: int = 0) -> Defects:
+    """Defects of usual size: names of `DEFECTS` joined by "+" or ",", or "all" of them.
+
+    Raises `UsageError` for an unknown name.
+    """
+    wanted = list(DEFECTS) if names == "all" else [name.strip() for name in names.replace("+", ",").split(",")]
+    unknown = [name for name in wanted if name not in DEFECTS]
+    if unknown:
+        raise UsageError(f"unknown defect '{unknown[0]}'; known are {', '.join(DEFECTS)} and all")
+    fields = {key: value for name in wanted for key, value in DEFECTS[name].items()}
+    return Defects(**fields, seed=seed)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
+from numbers import Integral
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,9 @@ from siloscope.scene.silo import Silo
 
 ASTRA = Camera(width=640, height=480, fx=570.3, fy=570.3, cx=319.5, cy=239.5)
 """The Orbbec Astra as the reconstructed scenarios use it."""
+
+LARGEST_FRAME = 1 << 24
+"""Pixels."""
 
 WORLDS = ("silo", "wall", "corner", "shaft", "sphere", "noise", "nothing")
 """What a scene can show; all but the first are no silos, to see whether they are taken for one."""
@@ -55,6 +59,8 @@ class Scene:
     def __post_init__(self) -> None:
         if self.world not in WORLDS:
             raise UsageError(f"unknown world '{self.world}'; known are {', '.join(WORLDS)}")
+        if not isinstance(self.seed, Integral) or not 0 <= self.seed < 2**64:
+            raise UsageError(f"seed must be a whole number between 0 and 2^64 - 1, got {self.seed!r}")
 
     def render(self, threads: int = 1) -> SimulatedFrame:
         """Casts every pixel's ray and measures it. The result does not depend on the number of threads.
@@ -65,6 +71,8 @@ class Scene:
             Where a number is outside its bounds, or the camera is buried in feed or outside the silo.
         """
         shape = (self.camera.height, self.camera.width)
+        if shape[0] * shape[1] > LARGEST_FRAME:
+            raise UsageError(f"a frame of {shape[1]} x {shape[0]} pixels is too large; simulate at most 16 megapixels")
         depth, labels, normals = checked(_core.render_scene, self, threads)
         if self.sensor.perfect:
             measured, false_returns = depth.copy(), np.zeros(depth.shape, np.bool_)

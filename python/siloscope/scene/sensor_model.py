@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from siloscope import _core
+from siloscope import _core, sensors
 from siloscope.scene.checked import checked
 
 
@@ -95,3 +95,33 @@ ASTRA_S = SensorModel(
     noise=(0.5e-3 / math.sqrt(12.0), -5e-4 / math.sqrt(12.0), 3e-3 / math.sqrt(12.0)),
 )
 """Orbbec Astra S: Eqs. 8 and 9, which are in millimetres, for metres."""
+
+
+def sensor_model(name: str, device: int | None = None) -> SensorModel:
+    """The model of a sensor: "perfect", or a profile's name, its last part ("d455"), or its file.
+
+    "astra-s" is `ASTRA_S`, Eqs. 8 and 9 without a limit of range, as the paper uses it. Of other profiles the range
+    counts as well; `device` draws the bias of one device from what the profile leaves open, None takes its mean.
+    Raises `UsageError` for an unknown name, `InputError` for a file that is no profile.
+    """
+    if name == "perfect":
+        return PERFECT
+    full = next((known for known in sensors.names() if known.endswith(f"-{name}")), name)
+    if full == "orbbec-astra-s":
+        return ASTRA_S
+    return _of_profile(sensors.load(full), device)
+
+
+def _of_profile(profile: sensors.SensorProfile, device: int | None) -> SensorModel:
+    floor, constant, linear, quadratic, factor, power = profile.noise or (0.0,) * 6
+    spread = np.zeros(3) if device is None else np.random.default_rng(device).normal(size=3)
+    bias = np.array(profile.bias) + spread * np.array(profile.bias_std)
+    return SensorModel(
+        bias=(float(bias[0]), float(bias[1]), float(bias[2])),
+        noise=(constant, linear, quadratic),
+        noise_scale=factor,
+        noise_power=power if factor else 2.0,
+        noise_floor=floor,
+        min_range=profile.range[0],
+        max_range=profile.range[1],
+    )
