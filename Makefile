@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find crates -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
-PYTHON_FILES := python tests docs
+PYTHON_FILES := python tests examples benchmarks docs
 
 export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -12,7 +12,7 @@ export MPLBACKEND := Agg
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test check lint types rust-test python-test bench docs dist requirements format clean
+.PHONY: help setup build demo test check lint types rust-test python-test bench docs images dist requirements format clean
 
 help: ## shows this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -59,6 +59,9 @@ bench: build ## times every step of locate, a PNG decode beside it
 
 docs: build ## builds the documentation into site/
 	$(BIN)/mkdocs build -q --strict
+
+images: build ## draws the documentation's pictures anew
+	$(BIN)/python docs/make_images.py
 
 dist: build ## builds an sdist, a wheel from that sdist, and tries the wheel in a new environment
 	.ci/try_wheel

@@ -47,12 +47,12 @@ def test_every_picture_shows_something(seen: SimulatedFrame) -> None:
     rows[:2] = np.nan
     for figure in (
         plots.depth_map(seen.measured),
-        plots.clouds(points, seen.pose, silo),
+        plots.clouds(points, points, seen.pose, silo),
         plots.candidates(points, wall, seen.pose, silo),
         plots.directions(vectors, seen.pose.axis_direction),
         plots.profile(seen.pose.to_silo(points), wall, silo),
         plots.errors(level, rows, np.full((9, 4), 1e-3)),
-        plots.ratios(level, np.full((9, 3), 1 / 3), np.abs(rows[:, 0])),
+        plots.ratios(level, np.full((9, 3), 1 / 3), {"one": np.abs(rows[:, 0]), "other": np.abs(rows[:, 1])}),
     ):
         assert colours(figure) > 50
 
@@ -61,7 +61,7 @@ def test_pictures_survive_what_was_not_seen(seen: SimulatedFrame) -> None:
     points, labels = cloud(seen)
     for silo in (SiloGeometry(), SiloGeometry(1.5), SiloGeometry(1.5, 1.9, None)):
         for few in (points[:0], points[:1], points[:300]):
-            plots.png(plots.clouds(few, seen.pose, silo), dpi=30)
+            plots.png(plots.clouds(few, few, seen.pose, silo), dpi=30)
             plots.png(plots.profile(seen.pose.to_silo(few), labels[: len(few)] == 1, silo), dpi=30)
             plots.png(plots.candidates(few, labels[: len(few)] == 1, seen.pose, silo), dpi=30)
     plots.png(plots.depth_map(np.full((4, 5), np.nan)), dpi=30)

@@ -35,4 +35,20 @@ def _help(command: str) -> str:
     return "```text\n" + "\n".join(lines) + "\n```"
 
 
-_PARTS: dict[str, Callable[[], str]] = {"commands": commands}
+def reasons() -> str:
+    """Every reason for which a frame is refused."""
+    from siloscope.surface import reasons as known
+
+    rows = [f"| `{slug}` | {meaning} | {advice} |" for slug, (meaning, advice) in known().items()]
+    return "\n".join(["| reason | what it means | what to try |", "|---|---|---|", *rows])
+
+
+def sensors() -> str:
+    """Every sensor profile that comes with siloscope."""
+    from siloscope.sensors import load, names
+
+    rows = [f"| `{name}` | {load(name).source} |" for name in names()]
+    return "\n".join(["| name | where its figures come from |", "|---|---|", *rows])
+
+
+_PARTS: dict[str, Callable[[], str]] = {"commands": commands, "reasons": reasons, "sensors": sensors}

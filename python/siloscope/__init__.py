@@ -1,10 +1,12 @@
 """Finds a silo's axis, geometry and content from one depth camera."""
 
+from siloscope import frames
 from siloscope._core import __version__
 from siloscope.camera import Camera
 from siloscope.errors import InputError, SiloscopeError, UsageError
 from siloscope.estimate import Estimate, Ratios, SiloGeometry
 from siloscope.frame import Frame
+from siloscope.locate import locate
 from siloscope.pose import SiloPose
 
 __all__ = [
@@ -18,4 +20,6 @@ __all__ = [
     "SiloscopeError",
     "UsageError",
     "__version__",
+    "frames",
+    "locate",
 ]

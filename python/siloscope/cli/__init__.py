@@ -30,6 +30,8 @@ class Command(NamedTuple):
 
 
 COMMANDS: tuple[Command, ...] = (
+    Command("demo", "demo:demo", "Simulate a discharge, find the axis in every frame, write a report: the first run."),
+    Command("locate", "locate:locate", "Find the silo's axis and the camera's pose in one frame."),
     Command("simulate", "simulate:simulate", "Write depth frames of a simulated silo, with their exact truth."),
 )
 

@@ -8,25 +8,37 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from siloscope.estimate import SiloGeometry
-from siloscope.plots.style import AMBER, BLUE, GREY, INK, RED, figure, heading, legend, tidy
+from siloscope.plots.depth import paint_depth
+from siloscope.plots.style import BLUE, GREY, INK, RED, figure, heading, legend, tidy
 from siloscope.plots.view import Points, View, bare, circle, outline, thin
 from siloscope.pose import SiloPose
 
 
-def clouds(points: Points, pose: SiloPose, silo: SiloGeometry) -> Figure:
+def clouds(points: Points, corrected: Points, pose: SiloPose, silo: SiloGeometry) -> Figure:
     """Input cloud (red, as the camera sees it) and adjusted cloud (blue, in the silo frame) with the silo's axis.
 
-    `points` is (N, 3) in the camera frame, in metres.
+    `points` is (N, 3) in the camera frame, in metres, `corrected` the same without the sensor's bias: what is adjusted.
     """
-    seen = thin(points)
-    adjusted = pose.to_silo(seen)
+    seen, adjusted = thin(points), pose.to_silo(thin(corrected))
     made = figure(12.0, 6.2)
     overview, front, side = made.subplots(1, 3, width_ratios=(1.25, 1.0, 1.0))
     _overview(overview, seen, adjusted, silo)
-    _elevation(front, seen, adjusted, 0, silo)
-    _elevation(side, seen, adjusted, 1, silo)
-    legend(front)
+    _elevation(front, seen, adjusted, 0, silo, pose.t_x)
+    _elevation(side, seen, adjusted, 1, silo, pose.t_y)
+    legend(front, columns=5)
     heading(made, "Before (red, camera frame) and after (blue, silo frame): the axis stands on z")
+    return made
+
+
+def overview(
+    depth: NDArray[np.floating], points: Points, corrected: Points, pose: SiloPose, silo: SiloGeometry
+) -> Figure:
+    """What goes in and what comes out: the depth image (H, W), and `clouds` from the side."""
+    made = figure(12.0, 5.2)
+    left, right = made.subplots(1, 2, width_ratios=(1.35, 1.0))
+    paint_depth(left, depth)
+    _overview(right, thin(points), pose.to_silo(thin(corrected)), silo)
+    legend(right, columns=3, gap=0.02)
     return made
 
 
@@ -62,7 +74,7 @@ def _overview(axes: Axes, seen: Points, adjusted: Points, silo: SiloGeometry) ->
     bare(axes)
 
 
-def _elevation(axes: Axes, seen: Points, adjusted: Points, across: int, silo: SiloGeometry) -> None:
+def _elevation(axes: Axes, seen: Points, adjusted: Points, across: int, silo: SiloGeometry, beside: float) -> None:
     for cloud, colour in ((seen, RED), (adjusted, BLUE)):
         label = "input cloud" if colour == RED else "adjusted cloud"
         axes.scatter(
@@ -73,9 +85,8 @@ def _elevation(axes: Axes, seen: Points, adjusted: Points, across: int, silo: Si
         wall = np.array([[silo.radius, _top(adjusted)], [silo.radius, silo.cylinder_bottom], [0.0, silo.apex]])
         for mirror in (-1.0, 1.0):
             axes.plot(mirror * wall[:, 0], wall[:, 1], color=INK, linewidth=0.9, alpha=0.55)
-    axes.plot(
-        [0.0], [0.0], marker="v", color=AMBER, markersize=9, markeredgecolor=INK, zorder=5, linestyle="", label="camera"
-    )
+    for place, colour in ((0.0, RED), (beside, BLUE)):
+        axes.plot([place], [0.0], marker="v", color=colour, markersize=9, zorder=5, linestyle="", label="camera")
     tidy(axes, "xy"[across] + "–z", f"{'xy'[across]} (m)", "z, down (m)" if across == 0 else "")
     axes.set_aspect("equal")
     axes.invert_yaxis()

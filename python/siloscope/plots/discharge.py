@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
-from siloscope.plots.style import AMBER, BLUE, CLASS_COLOURS, INK, MUTED, PURPLE, figure, heading, legend, tidy
+from siloscope.plots.style import AMBER, BLUE, CLASS_COLOURS, INK, MUTED, PURPLE, RED, figure, heading, legend, tidy
 
 Numbers = NDArray[np.float64]
 
@@ -33,8 +35,10 @@ def errors(level: Numbers, error: Numbers, std: Numbers | None = None, title: st
     return made
 
 
-def ratios(level: Numbers, share: Numbers, distance: Numbers, title: str = "What the camera sees") -> Figure:
-    """Shares (N, 3) of cylinder, cone and feed among the pixels, and the PC average distance (N,) in metres."""
+def ratios(
+    level: Numbers, share: Numbers, distances: Mapping[str, Numbers], title: str = "What the camera sees"
+) -> Figure:
+    """Shares (N, 3) of cylinder, cone and feed among the pixels, and PC average distances (N,) in metres by method."""
     made = figure(12.0, 4.8)
     parts, off = made.subplots(1, 2)
     names = ("cylinder", "cone", "feed")
@@ -43,12 +47,14 @@ def ratios(level: Numbers, share: Numbers, distance: Numbers, title: str = "What
     parts.stackplot(100.0 * level[order], *(100.0 * share[order].T), labels=names, colors=colours, alpha=0.85)
     parts.set_ylim(0.0, 100.0)
     tidy(parts, "share of the pixels (%)", "feed level (% of the height)")
-    off.semilogy(100.0 * level, 1e3 * distance, color=PURPLE, marker="o", markersize=3.5, linewidth=1.6, label="mean")
-    _refused(off, 100.0 * level, np.isnan(distance))
+    for (name, distance), colour in zip(distances.items(), (BLUE, RED, PURPLE, AMBER), strict=False):
+        off.semilogy(100.0 * level, 1e3 * distance, color=colour, marker="o", markersize=3.5, linewidth=1.6, label=name)
+    _refused(off, 100.0 * level, np.all([np.isnan(distance) for distance in distances.values()], axis=0))
     tidy(off, "PC average distance (mm), Eq. 11", "feed level (% of the height)")
     for axes in (parts, off):
         _runs_down(axes, level)
     legend(parts)
+    legend(off)
     heading(made, title)
     return made
 

@@ -14,23 +14,27 @@ from siloscope.plots.view import Points
 MOST = 40_000
 
 
-def profile(points: Points, wall: NDArray[np.bool_], silo: SiloGeometry) -> Figure:
+def profile(
+    points: Points, wall: NDArray[np.bool_], silo: SiloGeometry, residuals: Points | None = None, what: str = "points"
+) -> Figure:
     """Profile of a frame and residuals of its wall.
 
-    `points` is (N, 3) in the silo frame, `wall` (N,) tells the points the fit took for wall; the others were rejected
-    (feed, clutter, flying pixels).
+    `points` is (N, 3) in the silo frame, `wall` (N,) tells those the fit took for wall; the others were rejected
+    (feed, clutter, flying pixels). `residuals` (N,) are the fit's own distances from the wall in metres, outwards;
+    without them they are taken from `silo`. `what` names what the points are.
     """
     r, z = np.hypot(points[:, 0], points[:, 1]), points[:, 2]
+    off = 1e3 * (wall_distance(r, z, silo) if residuals is None else residuals)
     made = figure(12.0, 6.4)
     low, high = _reach(z, silo)
     share = float(np.clip(1.2 * r.max(initial=1e-6) / (high - low), 0.4, 1.2))
     left, right = made.subplots(1, 2, width_ratios=(share, 2.0 - share))
     _profile(left, r, z, wall, silo)
-    _residuals(right, r, z, wall, silo)
+    _residuals(right, off, z, wall)
     for axes in (left, right):
         axes.set_ylim(high, low)
     share = 100.0 * np.count_nonzero(wall) / max(len(wall), 1)
-    heading(made, f"r–z profile: {share:.0f} % of the points are wall")
+    heading(made, f"r–z profile: {share:.0f} % of the {what} are wall")
     return made
 
 
@@ -53,7 +57,9 @@ def _profile(axes: Axes, r: Points, z: Points, wall: NDArray[np.bool_], silo: Si
     few = _few(len(r))
     for kind, colour, label in ((~wall, AMBER, "rejected: feed, clutter"), (wall, BLUE, "wall")):
         chosen = few[kind[few]]
-        axes.scatter(r[chosen], z[chosen], s=1.6, c=colour, linewidths=0, alpha=0.5, label=label, rasterized=True)
+        axes.scatter(
+            r[chosen], z[chosen], s=_dot(len(few)), c=colour, linewidths=0, alpha=0.5, label=label, rasterized=True
+        )
     top = float(z.min()) if len(z) else 0.0
     if silo.radius is not None:
         bottom = silo.cylinder_bottom if silo.cylinder_bottom is not None else float(z[wall].max(initial=top))
@@ -68,15 +74,15 @@ def _profile(axes: Axes, r: Points, z: Points, wall: NDArray[np.bool_], silo: Si
     legend(axes, columns=1)
 
 
-def _residuals(axes: Axes, r: Points, z: Points, wall: NDArray[np.bool_], silo: SiloGeometry) -> None:
-    off = 1000.0 * wall_distance(r, z, silo)
-    few = _few(len(r))
+def _residuals(axes: Axes, off: Points, z: Points, wall: NDArray[np.bool_]) -> None:
+    few = _few(len(off))
     chosen = few[wall[few]]
     spread = float(np.nanpercentile(np.abs(off[wall]), 99.0)) if np.isfinite(off[wall]).any() else 1.0
     axes.axvline(0.0, color=MUTED, linewidth=1.0)
     others = few[~wall[few]]
-    axes.scatter(off[others], z[others], s=1.6, c=AMBER, linewidths=0, alpha=0.35, rasterized=True)
-    axes.scatter(off[chosen], z[chosen], s=1.6, c=BLUE, linewidths=0, alpha=0.25, rasterized=True)
+    size = _dot(len(few))
+    axes.scatter(off[others], z[others], s=size, c=AMBER, linewidths=0, alpha=0.35, rasterized=True)
+    axes.scatter(off[chosen], z[chosen], s=size, c=BLUE, linewidths=0, alpha=0.25, rasterized=True)
     _running_quantiles(axes, off[wall], z[wall])
     axes.set_xlim(-1.4 * spread, 1.4 * spread)
     known = off[wall][np.isfinite(off[wall])]
@@ -103,6 +109,11 @@ def _reach(z: Points, silo: SiloGeometry) -> tuple[float, float]:
     low, high = float(ends[0]), float(max(ends[1], silo.apex or ends[1]))
     air = max(0.03 * (high - low), 1e-3)
     return low - air, high + air
+
+
+def _dot(count: int) -> float:
+    """Size of a dot: fewer points may be bigger."""
+    return float(np.clip(40_000.0 / max(count, 1), 1.6, 9.0))
 
 
 def _few(count: int) -> NDArray[np.intp]:

@@ -48,9 +48,9 @@ def tidy(axes: Axes, title: str = "", x: str = "", y: str = "") -> Axes:
     return axes
 
 
-def legend(axes: Axes, below: bool = True, columns: int = 4) -> None:
+def legend(axes: Axes, below: bool = True, columns: int = 4, gap: float = 0.13) -> None:
     """A legend without a box: below the axes, or where there is room in them."""
-    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.13)} if below else {"loc": "best"}
+    place: dict[str, Any] = {"loc": "upper center", "bbox_to_anchor": (0.5, -gap)} if below else {"loc": "best"}
     made = axes.legend(
         ncols=columns if below else 1,
         fontsize=9.5,

@@ -1,0 +1,135 @@
+"""The time of `locate` by step, one thread and two, with a PNG decode and start-up times from the same run beside it.
+
+    python benchmarks/locate.py [--repeat N]
+
+All times are medians over the repeats and frames. The machine's load is in every number, so compare within one run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import io
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from PIL import Image
+from rich.console import Console
+from rich.table import Table
+
+import siloscope
+from siloscope.camera import Camera
+from siloscope.paper.scenarios import scenario
+from siloscope.scene import ASTRA_S, Scene, SimulatedFrame
+
+SCENARIOS = ("silo1", "silo2", "silo-r1")
+METHODS: tuple[tuple[str, str | None], ...] = (("surface", "orbbec-astra-s"),)
+
+
+def main() -> None:
+    """Prints the tables."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--repeat", type=int, default=11)
+    repeat = parser.parse_args().repeat
+    console = Console(width=110)
+    frames = [replace(scenario(name), sensor=ASTRA_S).render(threads=2) for name in SCENARIOS]
+    decode = statistics.median(decode_time(seen, repeat) for seen in frames)
+    console.print(whole_times(frames, decode, repeat))
+    for method, sensor in METHODS:
+        console.print(step_times(frames, method, sensor, repeat))
+    console.print(scaling(repeat))
+    console.print(start_up(repeat))
+
+
+def milliseconds(run: Callable[[], object], repeat: int) -> float:
+    """Median time of a call."""
+    times = []
+    for _ in range(repeat):
+        start = time.perf_counter()
+        run()
+        times.append(1e3 * (time.perf_counter() - start))
+    return statistics.median(times)
+
+
+def decode_time(seen: SimulatedFrame, repeat: int) -> float:
+    """Pillow decoding the frame's 16-bit PNG."""
+    buffer = io.BytesIO()
+    Image.fromarray(seen.raw(0.001)).save(buffer, "PNG")
+    return milliseconds(lambda: np.asarray(Image.open(io.BytesIO(buffer.getvalue()))), repeat)
+
+
+def located(seen: SimulatedFrame, method: str, sensor: str | None, threads: int = 1) -> siloscope.Estimate:
+    """One call of `locate` with the depth array in memory."""
+    depth = seen.measured
+    return siloscope.locate(depth, seen.camera, method=method, sensor=sensor, threads=threads)
+
+
+def whole_times(frames: Sequence[SimulatedFrame], decode: float, repeat: int) -> Table:
+    """Each method, one thread and two, against the PNG decode."""
+    table = Table(title="depth array to pose (ms)", title_justify="left")
+    for head in ("method", *SCENARIOS, "median", "PNG decodes", "2 threads", "speed-up"):
+        table.add_column(head, justify="left" if head == "method" else "right")
+    for method, sensor in METHODS:
+        one, two = (
+            [milliseconds(lambda: located(seen, method, sensor, threads), repeat) for seen in frames]  # noqa: B023
+            for threads in (1, 2)
+        )
+        middle, pair = statistics.median(one), statistics.median(two)
+        cells = [f"{value:.2f}" for value in (*one, middle)]
+        table.add_row(method, *cells, f"{middle / decode:.2f}", f"{pair:.2f}", f"{middle / pair:.2f}")
+    table.add_row("PNG decode", *[""] * len(SCENARIOS), f"{decode:.2f}", "1.00", "", "")
+    return table
+
+
+def step_times(frames: Sequence[SimulatedFrame], method: str, sensor: str | None, repeat: int) -> Table:
+    """The estimate's own clock, step by step."""
+    table = Table(title=f"{method} by step (ms)", title_justify="left")
+    table.add_column("step")
+    for name in SCENARIOS:
+        table.add_column(name, justify="right")
+    runs = [[located(seen, method, sensor).timing_ms for _ in range(repeat)] for seen in frames]
+    for step in runs[0][0]:
+        middles = [statistics.median(timing.get(step, 0.0) for timing in timings) for timings in runs]
+        table.add_row(step, *[f"{value:.3f}" for value in middles])
+    return table
+
+
+def scaling(repeat: int) -> Table:
+    """Twice the pixels, the same scene."""
+    table = Table(title="twice the pixels (ms)", title_justify="left")
+    for head in ("method", "640 x 480", "905 x 679", "ratio"):
+        table.add_column(head, justify="left" if head == "method" else "right")
+    small = replace(scenario("silo1"), sensor=ASTRA_S)
+    frames = [small.render(threads=2), finer(small, 2.0**0.5).render(threads=2)]
+    for method, sensor in METHODS:
+        times = [milliseconds(lambda: located(seen, method, sensor), repeat) for seen in frames]  # noqa: B023
+        table.add_row(method, *[f"{value:.2f}" for value in times], f"{times[1] / times[0]:.2f}")
+    return table
+
+
+def finer(scene: Scene, factor: float) -> Scene:
+    """The scene through a camera of the same view and more pixels."""
+    old = scene.camera
+    width, height = round(old.width * factor), round(old.height * factor)
+    centre = ((width - 1) / 2, (height - 1) / 2)
+    return replace(scene, camera=Camera(width, height, old.fx * factor, old.fy * factor, *centre))
+
+
+def start_up(repeat: int) -> Table:
+    """Import and help in a new process."""
+    table = Table(title="start-up (ms)", title_justify="left")
+    table.add_column("what")
+    table.add_column("median", justify="right")
+    for what in (["-c", "pass"], ["-c", "import siloscope"], ["-m", "siloscope", "--help"]):
+        command = [sys.executable, *what]
+        taken = milliseconds(lambda: subprocess.run(command, capture_output=True, check=True), repeat)  # noqa: B023
+        table.add_row("python " + " ".join(what), f"{taken:.0f}")
+    return table
+
+
+if __name__ == "__main__":
+    main()

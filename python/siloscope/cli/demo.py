@@ -1,0 +1,49 @@
+"""``siloscope demo``: the newcomer's first run."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from siloscope.cli import options
+from siloscope.cli.outcome import print_json, writing
+from siloscope.cli.progress import say, track
+from siloscope.demo import Step, locate_all, scenes, write_frame
+
+
+def demo(
+    out: Annotated[Path, typer.Option(metavar="DIR", help="Where to write the report.")] = Path("demo"),
+    steps: Annotated[int, typer.Option(min=1, max=1000, help="Frames of the discharge.")] = 24,
+    as_json: options.AsJson = False,
+) -> None:
+    """Simulate a silo that is emptied, find its axis in every frame, and write a report page.
+
+    [bold]Example:[/bold] siloscope demo --out demo
+
+    Also writes the last frame as a user would have it, with its camera file, to try `siloscope locate` on.
+    """
+    with writing(out):
+        out.mkdir(parents=True, exist_ok=True)
+    done = list(track(locate_all(scenes(steps)), "locating", total=steps))
+    say("drawing the report")
+    report = _write(done, out)
+    found = sum(step.estimates["surface"].ok for step in done)
+    if as_json:
+        print_json(_document(done, report))
+    else:
+        typer.echo(f"{found} of {steps} frames answered. The report: {report}")
+
+
+def _write(done: list[Step], out: Path) -> Path:
+    from siloscope.demo.page import page
+
+    finished = page(done)
+    with writing(out):
+        write_frame(done[-1].seen, out)
+        return finished.write(out / "report.html")
+
+
+def _document(done: list[Step], report: Path) -> dict[str, Any]:
+    return {"schema": "siloscope.demo/1", "report": str(report), "frames": [step.to_dict() for step in done]}

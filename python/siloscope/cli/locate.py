@@ -1,0 +1,92 @@
+"""``siloscope locate``: one frame in, the pose out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from numpy.typing import NDArray
+
+import siloscope
+from siloscope.cli import options
+from siloscope.cli.outcome import REFUSED, print_json, writing
+from siloscope.cli.progress import say
+from siloscope.estimate import Estimate
+from siloscope.frame import Frame
+
+
+def locate(
+    file: Annotated[Path, typer.Argument(metavar="FRAME", help="Depth image, depth array, point cloud or recording.")],
+    camera: options.CameraFile = None,
+    sensor: options.Sensor = None,
+    depth_unit: options.DepthUnit = None,
+    diameter: options.Diameter = None,
+    method: Annotated[str | None, typer.Option(help="surface (default) or shape-tensor, the paper's.")] = None,
+    out: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Write the adjusted cloud, the JSON and pictures here.")
+    ] = None,
+    mask: Annotated[Path | None, typer.Option(help="Image or .npy, not 0 where the silo is.")] = None,
+    label: Annotated[int | None, typer.Option(help="Use only points with this label of the file.")] = None,
+    crop: Annotated[
+        str | None, typer.Option(metavar="XMIN,XMAX,…,ZMAX", help="Use only points in this box of the camera frame, m.")
+    ] = None,
+    grid: Annotated[
+        float | None, typer.Option(metavar="M", help="Edge of the voxel grid's cells; 0.05 m unless given.")
+    ] = None,
+    neighbours: Annotated[int | None, typer.Option(min=3, help="Neighbours for normals and shape tensors.")] = None,
+    gravity: options.Gravity = None,
+    number: Annotated[int, typer.Option("--frame", min=0, help="Which frame of several, from 0.")] = 0,
+    stream: options.Stream = None,
+    threads: options.Threads = None,
+    as_json: options.AsJson = False,
+) -> int:
+    """Find the silo's axis in one frame, and so the camera's pose in the silo.
+
+    [bold]Example:[/bold] siloscope locate frame.png --camera camera.json --sensor orbbec-astra-s --out result
+
+    Exit code 4 tells that the frame was read well but does not show enough wall; the answer then says why.
+    """
+    with siloscope.frames.open(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
+        frame = options.one_frame(source, number)
+        several = len(source) > 1
+    if several and not as_json:
+        say(f"{frame.source}; choose another with --frame")
+    chosen = selection(frame, mask, label, crop)
+    settings: dict[str, Any] = {"method": method, "sensor": sensor, "diameter": diameter, "threads": threads}
+    settings |= {"grid": grid, "neighbours": neighbours}
+    settings["gravity"] = None if gravity is None else options.numbers(gravity, 3, "--gravity")
+    given = {name: value for name, value in settings.items() if value is not None}
+    estimate = siloscope.locate(frame, mask=chosen, **given)
+    return _answer(estimate, frame, chosen, out, as_json)
+
+
+def selection(frame: Frame, mask: Path | None, label: int | None, crop: str | None) -> NDArray[np.bool_] | None:
+    """What --mask, --label and --crop leave of a frame; None where none is given."""
+    from siloscope import region
+
+    shape = (frame.points[..., 0] if frame.points is not None else np.asarray(frame.depth)).shape
+    parts = [
+        None if mask is None else region.read_mask(mask, shape),
+        None if label is None else region.label_mask(frame, label),
+        None if crop is None else region.box_mask(frame, options.numbers(crop, 6, "--crop")),
+    ]
+    given = [part for part in parts if part is not None]
+    return np.logical_and.reduce(given) if given else None
+
+
+def _answer(estimate: Estimate, frame: Frame, mask: Any, out: Path | None, as_json: bool) -> int:
+    from siloscope.cli.summary import print_estimate
+
+    if out is not None:
+        from siloscope.results import write_results
+
+        with writing(out):
+            written = write_results(out, frame, estimate, mask)
+        say(f"wrote {len(written)} files to {out}")
+    if as_json:
+        print_json(estimate.to_dict())
+    else:
+        print_estimate(estimate, frame.source)
+    return 0 if estimate.ok else REFUSED

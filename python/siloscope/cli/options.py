@@ -1,0 +1,53 @@
+"""Options that several commands share, and how their values are read."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from siloscope.errors import InputError, UsageError
+from siloscope.frame import Frame
+from siloscope.frames import FrameSource
+
+CameraFile = Annotated[
+    Path | None, typer.Option("--camera", help="Intrinsics: JSON, TOML, ROS YAML or rs-enumerate-devices text.")
+]
+Sensor = Annotated[
+    str | None, typer.Option("--sensor", metavar="NAME|FILE", help="Sensor profile: its depth bias and noise.")
+]
+DepthUnit = Annotated[
+    float | None, typer.Option("--depth-unit", metavar="M", help="Metres per raw unit: 0.001 for millimetres.")
+]
+Diameter = Annotated[
+    float | None, typer.Option("--diameter", metavar="M", help="The silo's diameter by tape: fixes the depth's scale.")
+]
+Gravity = Annotated[
+    str | None, typer.Option("--gravity", metavar="X,Y,Z", help="Gravity in the camera frame, from an accelerometer.")
+]
+Stream = Annotated[str | None, typer.Option("--stream", help="Which depth stream of a recording.")]
+Threads = Annotated[int | None, typer.Option("--threads", min=1, max=256, help="Threads to use; 1 unless given.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else.")]
+
+
+def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
+    """Comma-separated finite numbers of an option."""
+    try:
+        values = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        values = ()
+    if len(values) != count or not all(math.isfinite(value) for value in values):
+        raise UsageError(f"{option} '{text}': give {count} numbers separated by commas")
+    return values
+
+
+def one_frame(source: FrameSource, number: int) -> Frame:
+    """Frame `number` (from 0) of a source."""
+    try:
+        return source[number]
+    except IndexError:
+        raise InputError(
+            f"{source.name}: there is no frame {number}; `siloscope info` tells how many there are"
+        ) from None

@@ -1,0 +1,81 @@
+"""An estimate as a person reads it: degrees and millimetres, what was seen, and what it means."""
+
+from __future__ import annotations
+
+import math
+
+from rich.console import Console
+from rich.table import Table
+
+from siloscope.estimate import Estimate, Ratios, SiloGeometry
+
+_ROWS = (
+    ("r_x", "turn about the camera's x-axis", math.degrees(1.0), "°"),
+    ("r_y", "turn about the y-axis after it", math.degrees(1.0), "°"),
+    ("t_x", "camera's place beside the axis, x", 1000.0, " mm"),
+    ("t_y", "camera's place beside the axis, y", 1000.0, " mm"),
+)
+
+
+def print_estimate(estimate: Estimate, source: str) -> None:
+    """A short table on stdout."""
+    console = Console(highlight=False, soft_wrap=True)
+    if not estimate.ok:
+        console.print(f"[bold yellow]refused[/] {source}: {estimate.reason}", markup=True)
+        console.print(estimate.message or "", markup=False)
+        return
+    console.print(f"[bold green]ok[/]      {source}: method {estimate.method}")
+    console.print(_pose_table(estimate))
+    for line in (_tilt(estimate), _silo(estimate.silo, estimate.silo_std), _seen(estimate.pixel_ratios)):
+        if line:
+            console.print(line, markup=False)
+
+
+def with_std(value: float | None, std: float | None, factor: float, unit: str) -> str:
+    """``12.3 ± 0.4 mm`` with as many digits as the deviation deserves."""
+    if value is None:
+        return "not seen"
+    if std is None or not math.isfinite(std):
+        return f"{value * factor:.4g}{unit}"
+    digits = 0 if std <= 0.0 else min(9, max(0, 1 - math.floor(math.log10(std * factor))))
+    return f"{value * factor:.{digits}f} ± {std * factor:.{digits}f}{unit}"
+
+
+def _pose_table(estimate: Estimate) -> Table:
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    table.add_column(style="dim")
+    stds = estimate.to_dict()["std"]
+    for name, meaning, factor, unit in _ROWS:
+        table.add_row(name, with_std(getattr(estimate, name), stds[name], factor, unit), meaning)
+    return table
+
+
+def _tilt(estimate: Estimate) -> str:
+    pose = estimate.pose
+    if pose is None:
+        return ""
+    tilt = math.degrees(math.acos(max(-1.0, min(1.0, float(pose.axis_direction[2])))))
+    return (
+        f"The camera looks {tilt:.2f}° off the axis and hangs {math.hypot(pose.t_x, pose.t_y) * 1000:.1f} mm beside it."
+    )
+
+
+def _silo(silo: SiloGeometry, std: SiloGeometry) -> str:
+    parts = [
+        f"{name} {with_std(getattr(silo, key), getattr(std, key), 1000.0, ' mm')}"
+        for key, name in (
+            ("radius", "radius"),
+            ("cylinder_bottom", "cylinder's bottom below the camera"),
+            ("apex", "cone's vertex below the camera"),
+        )
+    ]
+    return "Silo: " + ", ".join(parts) + "."
+
+
+def _seen(ratios: Ratios | None) -> str:
+    if ratios is None:
+        return ""
+    parts = [f"{name} {100 * share:.0f} %" for name, share in ratios.to_dict().items()]
+    return "Pixels: " + ", ".join(parts) + "."
