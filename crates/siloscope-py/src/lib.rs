@@ -7,6 +7,7 @@ mod convert;
 mod files;
 mod scene;
 mod surface;
+mod steps;
 
 /// The compiled core of siloscope.
 #[pymodule]
@@ -16,5 +17,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     files::register(m)?;
     scene::register(m)?;
     surface::register(m)?;
+    steps::register(m)?;
     Ok(())
 }

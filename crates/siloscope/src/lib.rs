@@ -4,6 +4,8 @@
 //! angles radians. The camera frame is optical (x right, y down, z forward); the silo frame has its origin on the
 //! axis at the camera's height and z along gravity.
 
+pub mod axis;
+pub mod backproject;
 pub mod camera;
 pub mod coarse;
 pub mod covariance;
@@ -21,6 +23,17 @@ pub mod sensor;
 pub mod start;
 pub mod surface;
 pub mod verdict;
+pub mod candidates;
+pub mod eigen;
+pub mod error;
+pub mod grid;
+pub mod locate;
+pub mod nearest;
+pub mod neighbours;
+pub mod normals;
+pub mod pose;
+pub mod shape_tensor;
+pub mod workers;
 
 pub use camera::{Camera, Distortion};
 pub use error::{Error, Result};
