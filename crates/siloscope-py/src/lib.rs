@@ -6,8 +6,8 @@ mod camera;
 mod convert;
 mod files;
 mod scene;
-mod surface;
 mod steps;
+mod surface;
 
 /// The compiled core of siloscope.
 #[pymodule]

@@ -89,7 +89,7 @@ pub fn axis_point(estimates: &[AxisPoint], x: &Vec3) -> Option<Vec3> {
 
 /// Median; of an even number of values the mean of the middle two.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    let (half, even) = (values.len() / 2, values.len() % 2 == 0);
+    let (half, even) = (values.len() / 2, values.len().is_multiple_of(2));
     if values.is_empty() {
         return None;
     }
