@@ -87,6 +87,8 @@ def _prepare_depth(
             f"{frame.source}: the frame is {width}x{height} pixels but the camera {chosen.width}x{chosen.height}; "
             "give the camera file of this stream"
         )
+    if not np.isfinite(chosen.rays()).all():
+        raise InputError(f"{frame.source}: the camera's distortion can't be undone; check its coefficients")
     kept = _mask(mask, depth.shape, frame.source)
     if kept is not None:
         depth = np.where(kept, depth, np.float32(0))
