@@ -6,7 +6,6 @@ mod camera;
 mod convert;
 mod files;
 mod scene;
-mod steps;
 mod surface;
 
 /// The compiled core of siloscope.
@@ -17,6 +16,5 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     files::register(m)?;
     scene::register(m)?;
     surface::register(m)?;
-    steps::register(m)?;
     Ok(())
 }
