@@ -2,6 +2,8 @@
 
 from siloscope import frames
 from siloscope._core import __version__
+from siloscope.calibrate import calibrate
+from siloscope.calibration import Calibration
 from siloscope.camera import Camera
 from siloscope.errors import InputError, SiloscopeError, UsageError
 from siloscope.estimate import Estimate, Ratios, SiloGeometry
@@ -10,6 +12,7 @@ from siloscope.locate import locate
 from siloscope.pose import SiloPose
 
 __all__ = [
+    "Calibration",
     "Camera",
     "Estimate",
     "Frame",
@@ -20,6 +23,7 @@ __all__ = [
     "SiloscopeError",
     "UsageError",
     "__version__",
+    "calibrate",
     "frames",
     "locate",
 ]

@@ -28,14 +28,29 @@ GRAVITY_STD = 0.01
 class SurfaceEvidence:
     """What one frame says about all parameters, without priors: what `calibrate` fuses.
 
-    `parameters` (10,) in the order of `PARAMETERS` (NaN where not seen), `information` (10, 10) of this frame alone,
-    `free` (10,) which are estimated, `scale_std` the standard deviation of the depth scale that no frame can tell.
+    Vectors are (10,) in the order of `PARAMETERS`, matrices (10, 10). Near `parameters` the frame's negative
+    log-likelihood is ``gradient @ δ + δ @ information @ δ / 2``. What was known before the frame (sensor profile,
+    diameter, gravity) stands beside it, because it is common to all frames.
     """
 
     parameters: NDArray[np.float64]
+    """The answer; NaN where a part was not seen."""
     information: NDArray[np.float64]
+    """Information of this frame alone."""
+    gradient: NDArray[np.float64]
+    """Gradient of this frame's negative log-likelihood at `parameters`."""
+    scatter: NDArray[np.float64]
+    """Covariance of `gradient` as the residuals have it."""
+    noise: NDArray[np.float64]
+    """The part of `scatter` that the sensor's noise makes; the rest (the wall's own shape, the lens) may come back."""
     free: NDArray[np.bool_]
+    """Which parameters were estimated."""
+    prior_mean: NDArray[np.float64]
+    """What was expected before; NaN where nothing was."""
+    prior_information: NDArray[np.float64]
+    """How firmly, as 1/variance; 0 where nothing was expected."""
     scale_std: float
+    """Standard deviation of the depth scale where no frame can tell it, else 0."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +102,7 @@ def fit_depth(
     found = _core.surface_fit_image(depth, camera.rays(), profile.bias, profile.bias_std, profile.noise, radius, pull)
     if "refusal" in found:
         return refused("surface", found["refusal"], config or {})
-    return _estimate(found, profile, config or {}, gravity)
+    return _estimate(found, profile, config or {}, diameter, gravity)
 
 
 def refused(method: str, slug: str, config: dict[str, Any]) -> Estimate:
@@ -103,11 +118,15 @@ def reasons() -> dict[str, tuple[str, str]]:
 
 
 def _estimate(
-    found: dict[str, Any], profile: SensorProfile, config: dict[str, Any], gravity: NDArray[np.float64] | None
+    found: dict[str, Any],
+    profile: SensorProfile,
+    config: dict[str, Any],
+    diameter: float | None,
+    gravity: NDArray[np.float64] | None,
 ) -> Estimate:
     pose = SiloPose(*found["pose"])
     covariance = found["covariance"]
-    silo, silo_std = _geometry(found["radius"], found["cone"], covariance)
+    silo, silo_std = geometry(found["radius"], found["cone"], covariance)
     extra = {"sensor": _sensor(found, profile), "fit": _quality(found)}
     if gravity is not None:
         extra["gravity"] = _gravity_check(pose, gravity)
@@ -123,12 +142,12 @@ def _estimate(
         config=config,
         timing_ms={name.replace(" ", "_"): ms for name, ms in found["timing"]},
         extra=extra,
-        evidence=_evidence(found, profile),
+        evidence=_evidence(found, profile, diameter, gravity),
         details=SurfaceDetails(found["points"], found["residuals"], found["labels"]),
     )
 
 
-def _geometry(
+def geometry(
     radius: float | None, cone: tuple[float, float] | None, covariance: NDArray[np.float64]
 ) -> tuple[SiloGeometry, SiloGeometry]:
     """Geometry and its standard deviations from radius R, cone slope m and apex z_a; bottom = z_a − R/m."""
@@ -185,9 +204,27 @@ def _gravity_check(pose: SiloPose, gravity: NDArray[np.float64]) -> dict[str, fl
     return {"r_x": from_gravity.r_x, "r_y": from_gravity.r_y, "angle_to_axis": angle}
 
 
-def _evidence(found: dict[str, Any], profile: SensorProfile) -> SurfaceEvidence:
+def _evidence(
+    found: dict[str, Any], profile: SensorProfile, diameter: float | None, gravity: NDArray[np.float64] | None
+) -> SurfaceEvidence:
     slope, apex = found["cone"] or (np.nan, np.nan)
     radius = np.nan if found["radius"] is None else found["radius"]
-    parameters = np.array([*found["pose"], radius, slope, apex, *found["bias"]])
     free = np.array(found["free"])
-    return SurfaceEvidence(parameters, found["information"], free, 0.0 if free[8] else profile.bias_std[1])
+    expected = np.full(len(PARAMETERS), np.nan)
+    expected[7:] = profile.bias
+    if diameter is not None:
+        expected[4] = diameter / 2.0
+    if gravity is not None:
+        tilt = SiloPose.from_axis(gravity, np.zeros(3))
+        expected[:2] = tilt.r_x, tilt.r_y
+    return SurfaceEvidence(
+        parameters=np.array([*found["pose"], radius, slope, apex, *found["bias"]]),
+        information=found["information"],
+        gradient=found["gradient"],
+        scatter=found["scatter"],
+        noise=found["noise_share"],
+        free=free,
+        prior_mean=expected,
+        prior_information=found["prior"],
+        scale_std=0.0 if free[8] else profile.bias_std[1],
+    )

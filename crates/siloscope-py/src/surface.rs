@@ -10,6 +10,7 @@ use siloscope::labels::{Labels, label_pixels};
 use siloscope::patches::DepthImage;
 use siloscope::refusal::Refusal;
 use siloscope::sensor::{DepthBias, DepthError, NoiseLaw};
+use siloscope::share::FrameShare;
 use siloscope::surface::PARAMETERS;
 
 /// Bias and noise as plain numbers: offset, scale, quadratic; floor, constant, linear, quadratic, factor, power.
@@ -88,6 +89,14 @@ fn add_labels(py: Python<'_>, out: &Bound<'_, PyDict>, labels: Labels, shape: (u
     out.set_item("areas", labels.areas)
 }
 
+fn add_share(py: Python<'_>, out: &Bound<'_, PyDict>, share: &FrameShare) -> PyResult<()> {
+    for (name, m) in [("information", &share.information), ("scatter", &share.scatter), ("noise_share", &share.noise)] {
+        out.set_item(name, matrix(py, m)?)?;
+    }
+    out.set_item("gradient", PyArray1::from_slice(py, share.gradient.as_slice()))?;
+    out.set_item("prior", PyArray1::from_slice(py, share.prior.as_slice()))
+}
+
 fn matrix<'py>(py: Python<'py>, m: &siloscope::surface::Information) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_slice(py, m.transpose().as_slice()).reshape([PARAMETERS, PARAMETERS])
 }
@@ -105,7 +114,7 @@ fn result<'py>(py: Python<'py>, found: &SurfaceFit) -> PyResult<Bound<'py, PyDic
     out.set_item("chi_square", found.chi_square)?;
     out.set_item("free", found.free.to_vec())?;
     out.set_item("covariance", matrix(py, &found.covariance)?)?;
-    out.set_item("information", matrix(py, &found.information)?)?;
+    add_share(py, &out, &found.share)?;
     let n = found.noise;
     out.set_item("noise", (n.floor, n.constant, n.linear, n.quadratic, n.power_factor, n.power))?;
     let points: Vec<f64> = found.patch_points().into_iter().flat_map(|p| [p.x, p.y, p.z]).collect();

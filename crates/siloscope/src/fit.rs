@@ -8,6 +8,7 @@ use crate::polish::{TileEquation, moved, pixel_equations, polish, solve_equation
 use crate::refine::{Equation, Fit, Prior, Problem, tukey};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthError, NoiseLaw};
+use crate::share::FrameShare;
 use crate::surface::{Information, PARAMETERS};
 use crate::verdict::WallEvidence;
 
@@ -29,8 +30,8 @@ pub struct SurfaceFit {
     pub fit: Fit,
     /// Covariance over all parameters; zero rows for those that are not free.
     pub covariance: Information,
-    /// Information that this frame alone adds, without priors (for fusing frames).
-    pub information: Information,
+    /// What this frame alone says, without priors (for fusing frames).
+    pub share: FrameShare,
     /// Which parameters are estimated.
     pub free: [bool; PARAMETERS],
     /// Noise law used.
@@ -133,6 +134,7 @@ fn finish(problem: &Problem, mut fit: Fit, tiles: &[TileEquation], evidence: Wal
         tiles.iter().map(|t| (t.patch, moved(&t.equation, &total, fit.misfit))).collect();
     let (model, free) = system.covariance(&fit)?;
     let mut covariance = widened(problem, &model, &system, &equations);
+    let share = FrameShare::new((&system, &covariance), (&equations, fit.misfit), &free);
     if !free[8] {
         covariance += scale_uncertainty(&fit, problem.prior.bias_std[1]);
     }
@@ -147,11 +149,9 @@ fn finish(problem: &Problem, mut fit: Fit, tiles: &[TileEquation], evidence: Wal
         chi += weight * squared;
         weights += weight;
     }
-    let mut information = system.information - system.prior;
-    information.fill_lower_triangle_with_upper_triangle();
     Some(SurfaceFit {
         covariance,
-        information,
+        share,
         free,
         noise: problem.noise,
         chi_square: chi / f64::max(weights, 1.0),

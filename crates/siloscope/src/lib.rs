@@ -18,6 +18,7 @@ pub mod pose;
 pub mod refine;
 pub mod refusal;
 pub mod sensor;
+pub mod share;
 pub mod start;
 pub mod surface;
 pub mod verdict;

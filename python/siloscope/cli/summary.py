@@ -7,6 +7,7 @@ import math
 from rich.console import Console
 from rich.table import Table
 
+from siloscope.calibration import Calibration
 from siloscope.estimate import Estimate, Ratios, SiloGeometry
 
 _ROWS = (
@@ -25,8 +26,8 @@ def print_estimate(estimate: Estimate, source: str) -> None:
         console.print(estimate.message or "", markup=False)
         return
     console.print(f"[bold green]ok[/]      {source}: method {estimate.method}")
-    console.print(_pose_table(estimate))
-    for line in (_tilt(estimate), _silo(estimate.silo, estimate.silo_std), _seen(estimate.pixel_ratios)):
+    console.print(pose_table(estimate))
+    for line in (tilt_line(estimate), silo_line(estimate.silo, estimate.silo_std), _seen(estimate.pixel_ratios)):
         if line:
             console.print(line, markup=False)
 
@@ -41,7 +42,8 @@ def with_std(value: float | None, std: float | None, factor: float, unit: str) -
     return f"{value * factor:.{digits}f} ± {std * factor:.{digits}f}{unit}"
 
 
-def _pose_table(estimate: Estimate) -> Table:
+def pose_table(estimate: Estimate | Calibration) -> Table:
+    """The four numbers of the pose with their standard deviations."""
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     table.add_column(style="bold")
     table.add_column(justify="right")
@@ -52,7 +54,8 @@ def _pose_table(estimate: Estimate) -> Table:
     return table
 
 
-def _tilt(estimate: Estimate) -> str:
+def tilt_line(estimate: Estimate | Calibration) -> str:
+    """The pose in words."""
     pose = estimate.pose
     if pose is None:
         return ""
@@ -62,7 +65,8 @@ def _tilt(estimate: Estimate) -> str:
     )
 
 
-def _silo(silo: SiloGeometry, std: SiloGeometry) -> str:
+def silo_line(silo: SiloGeometry, std: SiloGeometry) -> str:
+    """The geometry with its standard deviations."""
     parts = [
         f"{name} {with_std(getattr(silo, key), getattr(std, key), 1000.0, ' mm')}"
         for key, name in (

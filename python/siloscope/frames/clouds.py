@@ -43,8 +43,7 @@ class CloudSource(FrameSource):
     @cached_property
     def _recovered(self) -> Camera | None:
         try:
-            with np.errstate(all="ignore"):
-                return self._read(self.path).camera
+            return self._read(self.path).camera
         except InputError:
             return None  # told where the frame itself is asked for
 

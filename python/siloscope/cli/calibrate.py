@@ -1,0 +1,98 @@
+"""``siloscope calibrate``: many frames in, the silo's calibration out."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+import siloscope
+from siloscope.calibration import QUALITY, Calibration
+from siloscope.cli import options
+from siloscope.cli.outcome import PARTIAL, REFUSED, print_json, writing
+from siloscope.cli.progress import say, track
+from siloscope.cli.summary import pose_table, silo_line, tilt_line
+from siloscope.frames import FrameSource
+
+
+def calibrate(
+    files: Annotated[list[Path], typer.Argument(metavar="FRAMES…", help="Frames, folders or recordings, in order.")],
+    out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Where to write the calibration.")],
+    camera: options.CameraFile = None,
+    sensor: options.Sensor = None,
+    depth_unit: options.DepthUnit = None,
+    diameter: options.Diameter = None,
+    gravity: options.Gravity = None,
+    earlier: Annotated[
+        Path | None, typer.Option("--continue", metavar="FILE", help="An earlier calibration to go on with.")
+    ] = None,
+    rule: Annotated[str, typer.Option(help="information, or mean-of-last-10, the paper's.")] = "information",
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Frames at the same time; all cores unless given.")
+    ] = None,
+    stream: options.Stream = None,
+    as_json: options.AsJson = False,
+) -> int:
+    """Fuse many frames of one silo to its calibration: the camera's pose and the silo's geometry.
+
+    [bold]Example:[/bold] siloscope calibrate day1/*.png --camera camera.json --sensor orbbec-astra-s -o silo7.json
+
+    Frames count by what they show; bad ones are left out and named. Where the camera has moved, only the frames since
+    are fused. Exit code 4: no frame shows enough wall; 5: some frames can't be read, the rest is written.
+    """
+    down = None if gravity is None else options.numbers(gravity, 3, "--gravity")
+    with siloscope.frames.open(files, camera=camera, depth_unit=depth_unit, stream=stream) as source:
+        found = siloscope.calibrate(
+            source,
+            sensor=sensor,
+            diameter=diameter,
+            gravity=down,
+            continue_from=earlier,
+            rule=rule,
+            jobs=jobs or os.cpu_count() or 1,
+            progress=lambda frames: track(frames, "locating", _count(source)),
+        )
+    with writing(out):
+        found.save(out)
+    if as_json:
+        print_json(found.to_dict())
+    else:
+        _print(found, out)
+    if not found.ok:
+        return REFUSED
+    return PARTIAL if found.counts["unreadable"] else 0
+
+
+def _count(source: FrameSource) -> int | None:
+    try:
+        return len(source)
+    except TypeError:
+        return None
+
+
+def _print(found: Calibration, out: Path) -> None:
+    """A short table on stdout, remarks on stderr."""
+    console = Console(highlight=False, soft_wrap=True)
+    counts = ", ".join(f"{count} {status}" for status, count in found.counts.items() if count)
+    if not found.ok:
+        console.print(f"[bold yellow]refused[/] {found.reason} ({counts})", markup=True)
+        console.print(found.message or "", markup=False)
+        return
+    console.print(f"[bold green]ok[/]      {out}: {counts}", markup=True)
+    console.print(pose_table(found))
+    for line in (tilt_line(found), silo_line(found.silo, found.silo_std)):
+        console.print(line, markup=False)
+    for code in found.quality:
+        say(f"{code}: {QUALITY[code]}{_when(found) if code == 'camera-moved' else ''}")
+
+
+def _when(found: Calibration) -> str:
+    """From which frame on, and how far the camera moved."""
+    move = found.moved_at
+    if move is None:
+        return ""
+    name = next((record.name for record in found.frames if record.index == move.index), f"frame {move.index}")
+    return f"; last before {name}, by {1e3 * move.shift:.1f} mm and {1e3 * move.turn:.2f} mrad"

@@ -1,0 +1,314 @@
+"""Frames of one silo, fused by information: robust centre, weights, and a covariance that contains what they share.
+
+Notation: frame i has the answer θ_i, its information Λ_i and gradient g_i there (`SurfaceEvidence`), so that its
+negative log-likelihood is ``g_i·δ + δᵀ Λ_i δ / 2`` at θ_i + δ. Priors are common to all frames and enter once.
+The manual's page on calibration derives every formula.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope.surface import PARAMETERS, SurfaceEvidence
+
+SIZE = len(PARAMETERS)
+RADIUS, SCALE, QUADRATIC = (PARAMETERS.index(name) for name in ("radius", "scale", "quadratic"))
+LENGTHS = tuple(PARAMETERS.index(name) for name in ("t_x", "t_y", "radius", "apex"))
+"""Parameters that grow with the depth scale."""
+
+AGREE = 2.58
+"""A frame counts fully up to this many standard deviations (99 % of a normal variable), not at all beyond √2 times."""
+
+STARTS = 12
+"""Frames from which the search for the majority's answer starts."""
+
+Vector = NDArray[np.float64]
+Matrix = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Sums:
+    """Frames added up about `origin` (10,): what is kept of frames whose own evidence is not.
+
+    `information` is Σ w Λ, `pull` Σ w (Λ (θ - origin) - g), `noise` Σ w² N, `shared` Σ w E, `weight` Σ w.
+    """
+
+    origin: Vector
+    information: Matrix
+    pull: Vector
+    noise: Matrix
+    shared: Matrix
+    weight: float
+    frames: int
+    prior_information: Vector
+    prior_mean: Vector
+
+    @classmethod
+    def nothing(cls) -> Sums:
+        """No frames."""
+        zero, none = np.zeros((SIZE, SIZE)), np.zeros(SIZE)
+        return cls(none, zero, none, zero, zero, 0.0, 0, none, none)
+
+
+class Stack:
+    """Evidence of several frames as arrays, one frame a row."""
+
+    def __init__(self, frames: Sequence[SurfaceEvidence]) -> None:
+        self.count = len(frames)
+        self.answers = _stacked([f.parameters for f in frames], (SIZE,))
+        self.seen = np.isfinite(self.answers)
+        self.free = _stacked([f.free for f in frames], (SIZE,)).astype(bool)
+        self.information = _stacked([f.information for f in frames], (SIZE, SIZE))
+        self.gradient = _stacked([f.gradient for f in frames], (SIZE,))
+        self.noise = _stacked([f.noise for f in frames], (SIZE, SIZE))
+        scatter = _stacked([f.scatter for f in frames], (SIZE, SIZE))
+        self.prior = _stacked([f.prior_information for f in frames], (SIZE,))
+        self.expected = _stacked([f.prior_mean for f in frames], (SIZE,))
+        both = self.free[:, :, None] & self.free[:, None, :]
+        self.shared = _positive(np.where(both, scatter - self.noise, 0.0))
+        self.metric = self._metric(scatter, both)
+        self.dof = self.free.sum(axis=1)
+        self.scale_std = max((f.scale_std for f in frames), default=0.0)
+
+    def _metric(self, scatter: Matrix, both: NDArray[np.bool_]) -> Matrix:
+        """Inverse covariances ``H (S + Π)⁻¹ H`` of the frames' own answers, H = Λ + Π; zero where not free."""
+        prior = np.einsum("ni,ij->nij", self.prior, np.eye(SIZE))
+        joint = np.where(both, self.information + prior, 0.0)
+        fixed = np.einsum("ni,ij->nij", ~self.free, np.eye(SIZE))
+        spread = np.where(both, scatter + prior, 0.0) + fixed
+        scale = 1.0 / np.sqrt(np.maximum(np.einsum("nii->ni", spread), 1e-300))
+        spread = spread * scale[:, :, None] * scale[:, None, :]
+        joint = joint * scale[:, :, None]
+        metric: Matrix = np.einsum("nji,njk->nik", joint, np.linalg.solve(spread, joint))
+        return metric
+
+    def take(self, which: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Stack:
+        """Some of the frames."""
+        part = object.__new__(Stack)
+        for name, value in self.__dict__.items():
+            part.__dict__[name] = value[which] if isinstance(value, np.ndarray) else value
+        part.count = len(part.answers)
+        return part
+
+    def distances(self, centres: Matrix) -> Matrix:
+        """Squared distances (K, N) of the frames' answers from K `centres` (K, 10), each in its own covariance."""
+        known = np.isfinite(centres)[:, None, :] & self.seen[None, :, :]
+        gaps = np.where(known, self.answers[None, :, :] - centres[:, None, :], 0.0)
+        fixed = ~self.free[None, :, SCALE] & known[:, :, SCALE]
+        if fixed.any():  # a frame that took the scale for granted answers for its own scale
+            shift = np.where(fixed, self.answers[None, :, SCALE] - centres[:, None, SCALE], 0.0)
+            lengths = np.nan_to_num(centres)[:, None, list(LENGTHS)] * known[:, :, list(LENGTHS)]
+            gaps[:, :, list(LENGTHS)] += shift[:, :, None] * lengths
+        across = np.matmul(gaps.transpose(1, 0, 2), self.metric).transpose(1, 0, 2)
+        squared: Matrix = (across * gaps).sum(axis=2)
+        return squared
+
+
+@dataclass(frozen=True, eq=False)
+class Fused:
+    """The frames' common answer: `parameters` (10,), NaN where nobody saw; `covariance` (10, 10), zero there."""
+
+    parameters: Vector
+    covariance: Matrix
+    solved: NDArray[np.bool_]
+    weights: Vector
+    """Of each frame, 0 to 1."""
+    deviations: Vector
+    """Distance of each frame from the answer: as rare as for a normal variable so many standard deviations off."""
+    excess: float
+    """Scatter of the frames over what they state; 1 where they state enough."""
+    scale_std: float
+    """Standard deviation of the depth scale that nothing could tell; contained in `covariance`."""
+
+
+def fuse(stack: Stack, earlier: Sums | None = None) -> Fused:
+    """Robust fusion: the answer of the majority, then every frame weighed by how well it agrees."""
+    base = earlier or Sums.nothing()
+    everyone = np.ones((1, stack.count), bool)
+    centre = majority(stack, everyone, _starts(stack), base)
+    weights, excess = np.ones(stack.count), 1.0
+    for _ in range(30):
+        squared = stack.distances(centre)[0]
+        excess = _excess(squared, stack.dof)
+        new = agreement(deviation(squared / excess, stack.dof))
+        centre = solve(stack, new[None], base)
+        settled = np.allclose(new, weights, atol=1e-9)
+        weights = new
+        if settled:
+            break
+    return _with_covariance(stack, weights, base, centre[0], excess)
+
+
+def solve(stack: Stack, weights: Matrix, base: Sums) -> Matrix:
+    """Answers (K, 10) to K weightings (K, N): ``(Σ w Λ + Π)⁻¹ (Σ w (Λ θ - g) + Π μ)``; NaN for what nobody saw."""
+    system, pull, origin, solved = _systems(stack, weights, base)
+    answers = origin + _solve(system, pull[:, :, None])[:, :, 0]
+    answers[:, :7][~solved[:, :7]] = np.nan
+    return answers
+
+
+def majority(stack: Stack, members: NDArray[np.bool_], starts: NDArray[np.intp], base: Sums) -> Matrix:
+    """Least trimmed squares for K groups of frames: the answers (K, 10) about which half of a group lie closest.
+
+    `members` (K, N) are the groups, `starts` (S,) or (K, S) the frames from which the search starts.
+    """
+    if base.weight > stack.count:
+        return solve(stack, members.astype(float), base)
+    groups, tries = len(members), np.broadcast_to(starts, (len(members), np.shape(starts)[-1]))
+    within = np.repeat(members, tries.shape[1], axis=0)
+    centres = stack.answers[tries.ravel()]
+    half = np.where(within.sum(axis=1) > 2, within.sum(axis=1) // 2 + 1, within.sum(axis=1))
+    for _ in range(4):
+        centres = solve(stack, _closest(stack, centres, within, half)[0], base)
+    cost = _closest(stack, centres, within, half)[1].reshape(groups, -1)
+    best: Matrix = centres.reshape(groups, -1, SIZE)[np.arange(groups), cost.argmin(axis=1)]
+    return best
+
+
+def _closest(stack: Stack, centres: Matrix, within: NDArray[np.bool_], half: NDArray[np.int_]) -> tuple[Matrix, Vector]:
+    """Weights (K, N) of the `half` frames closest to each centre, and the sum of their distances."""
+    relative = np.where(within, stack.distances(centres) / np.maximum(stack.dof, 1), np.inf)
+    order = np.argsort(relative, axis=1, kind="stable")
+    ranks = np.empty_like(order)
+    np.put_along_axis(ranks, order, np.arange(stack.count)[None], axis=1)
+    chosen = ranks < half[:, None]
+    return chosen.astype(float), np.where(chosen, relative, 0.0).sum(axis=1)
+
+
+def sums(stack: Stack, weights: Vector, origin: Vector, base: Sums | None = None) -> Sums:
+    """The frames added up, to be gone on with when their own evidence is no longer there."""
+    start = base or Sums.nothing()
+    origin = np.nan_to_num(origin)
+    information, pull = _added(stack, weights[None], origin)
+    prior, mean = prior_of(stack, weights[None], start)
+    return Sums(
+        origin,
+        information[0] + start.information,
+        pull[0] + start.pull + start.information @ (start.origin - origin),
+        np.einsum("n,nij->ij", weights**2, stack.noise) + start.noise,
+        np.einsum("n,nij->ij", weights, stack.shared) + start.shared,
+        float(weights.sum()) + start.weight,
+        stack.count + start.frames,
+        prior,
+        mean[0],
+    )
+
+
+def deviation(squared: Vector, dof: NDArray[np.int_]) -> Vector:
+    """Standard normal deviate that is as rare as these chi-squares (Wilson and Hilferty's cube root)."""
+    k = np.maximum(dof, 1)
+    deviate: Vector = (np.cbrt(squared / k) - (1.0 - 2.0 / (9.0 * k))) / np.sqrt(2.0 / (9.0 * k))
+    return deviate
+
+
+def agreement(deviations: Vector) -> Vector:
+    """Weight of frames by their deviation."""
+    return np.clip(2.0 - (np.maximum(deviations, 0.0) / AGREE) ** 2, 0.0, 1.0)
+
+
+def prior_of(stack: Stack, weights: Matrix, base: Sums) -> tuple[Vector, Matrix]:
+    """What was known before the frames, once for all of them: information (10,), and mean (K, 10) for K weightings.
+
+    Frames may state different means where each has its own accelerometer reading.
+    """
+    held = (stack.prior > 0.0).astype(float)
+    information = np.maximum(stack.prior.max(axis=0, initial=0.0), base.prior_information)
+    total, count = weights @ (held * np.nan_to_num(stack.expected)), weights @ held
+    mean = np.where(count > 0.0, total / np.maximum(count, 1e-300), base.prior_mean)
+    return information, mean
+
+
+def _starts(stack: Stack) -> NDArray[np.intp]:
+    """Frames of every quality, chosen without regard to their order."""
+    order = np.argsort(np.einsum("nii->n", stack.metric[:, :4, :4]))[::-1]
+    return order[np.unique(np.linspace(0, stack.count - 1, STARTS).round().astype(np.intp))]
+
+
+def _excess(squared: Vector, dof: NDArray[np.int_]) -> float:
+    """Median of the squared distances over the median that chi-square has; at least 1."""
+    if len(squared) < 2:
+        return 1.0
+    k = np.maximum(dof, 1)
+    return max(1.0, float(np.median(squared / (k * (1.0 - 2.0 / (9.0 * k)) ** 3))))
+
+
+def _added(stack: Stack, weights: Matrix, origin: Vector) -> tuple[Matrix, Matrix]:
+    """``Σ w Λ`` (K, 10, 10) and ``Σ w (Λ (θ - origin) - g)`` (K, 10)."""
+    gap = np.where(stack.seen, stack.answers - origin, 0.0)
+    pulls = np.einsum("nij,nj->ni", stack.information, gap) - stack.gradient
+    information = weights @ stack.information.reshape(stack.count, -1)
+    return information.reshape(-1, SIZE, SIZE), weights @ pulls
+
+
+def _systems(stack: Stack, weights: Matrix, base: Sums) -> tuple[Matrix, Matrix, Vector, NDArray[np.bool_]]:
+    """Normal equations about an origin, and which parameters they determine; the others stay at the origin."""
+    origin = _origin(stack, base)
+    information, pull = _added(stack, weights, origin)
+    information = information + base.information
+    pull = pull + base.pull + base.information @ (base.origin - origin)
+    prior, mean = prior_of(stack, weights, base)
+    solved = np.einsum("kii->ki", information) > 0.0
+    solved[:, 7:] &= prior[7:] > 0.0
+    solved[:, SCALE] &= solved[:, RADIUS] & (prior[RADIUS] > 0.0)
+    both = solved[:, :, None] & solved[:, None, :]
+    held = np.where(solved, prior, 1.0)
+    system = np.where(both, information, 0.0) + held[:, :, None] * np.eye(SIZE)
+    return system, np.where(solved, pull + prior * (mean - origin), 0.0), origin, solved
+
+
+def _origin(stack: Stack, base: Sums) -> Vector:
+    """A point near the answer, so that sums about it keep their digits."""
+    seen = stack.seen.any(axis=0)
+    return np.where(
+        seen,
+        [np.median(a[s]) if s.any() else 0.0 for a, s in zip(stack.answers.T, stack.seen.T, strict=True)],
+        base.origin,
+    )
+
+
+def _with_covariance(stack: Stack, weights: Vector, base: Sums, centre: Vector, excess: float) -> Fused:
+    """Sandwich ``P (Π + c² (Σ w² N + Σw · Σ w E)) P``: noise averages down, what frames may share does not."""
+    systems, _, origin, solved = _systems(stack, weights[None], base)
+    system, solved = systems[0], solved[0]
+    total = sums(stack, weights, origin, base)
+    spread = np.diag(total.prior_information) + excess * (total.noise + total.weight * total.shared)
+    inverse = _solve(system, np.eye(SIZE))
+    covariance = inverse @ np.where(solved[:, None] & solved, spread, 0.0) @ inverse
+    scale_std = 0.0 if solved[SCALE] else stack.scale_std
+    covariance += _scale_share(centre, scale_std)
+    deviations = deviation(stack.distances(centre[None])[0] / excess, stack.dof)
+    return Fused(centre, covariance, solved, weights, deviations, excess, scale_std)
+
+
+def _scale_share(centre: Vector, std: float) -> Matrix:
+    """Every length of the answer goes with an unknown scale, however many frames there are."""
+    share = np.zeros(SIZE)
+    share[list(LENGTHS)] = np.nan_to_num(centre[list(LENGTHS)]) * std
+    share[SCALE] = std
+    share[QUADRATIC] = -2.0 * np.nan_to_num(centre[QUADRATIC]) * std
+    return np.outer(share, share)
+
+
+def _solve(system: Matrix, right: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Solution of symmetric equations whose unknowns differ by many orders of magnitude."""
+    scale = 1.0 / np.sqrt(np.maximum(np.einsum("...ii->...i", system), 1e-300))[..., None]
+    scaled = system * scale * np.swapaxes(scale, -1, -2)
+    solution: Matrix = scale * np.linalg.solve(scaled + 1e-13 * np.eye(SIZE), right * scale)
+    return solution
+
+
+def _positive(matrices: Matrix) -> Matrix:
+    """The nearest matrices without negative eigenvalues, in units of their own diagonals."""
+    scale = np.sqrt(np.maximum(np.abs(np.einsum("nii->ni", matrices)), 1e-300))
+    values, vectors = np.linalg.eigh(matrices / scale[:, :, None] / scale[:, None, :])
+    clipped = np.einsum("nij,nj,nkj->nik", vectors, np.maximum(values, 0.0), vectors)
+    positive: Matrix = clipped * scale[:, :, None] * scale[:, None, :]
+    return positive
+
+
+def _stacked(rows: Sequence[NDArray[np.generic]], shape: tuple[int, ...]) -> NDArray[np.float64]:
+    return np.asarray(rows, np.float64).reshape(len(rows), *shape)

@@ -1,0 +1,334 @@
+"""Calibration: laws of fusion, what must be left out, the change point, and files that come back."""
+
+from __future__ import annotations
+
+import functools
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, calibrate, sensors
+from siloscope.cli import main
+from siloscope.paper.scenarios import scenario
+from siloscope.scene import ASTRA_S, Scene, discharge
+from siloscope.surface import fit_depth
+
+SILO3 = replace(scenario("silo3"), sensor=ASTRA_S)
+
+
+@functools.cache
+def located(scene: Scene, sensor: str | None = "orbbec-astra-s", diameter: float | None = None) -> Estimate:
+    depth = np.nan_to_num(scene.render().measured).astype(np.float32)
+    return fit_depth(depth, scene.camera, sensors.load(sensor), diameter=diameter)
+
+
+@functools.cache
+def sequence(steps: int = 8, highest: float = 0.5, lowest: float = 0.1, **known: Any) -> tuple[Estimate, ...]:
+    return tuple(located(scene, **known) for scene in discharge(SILO3, steps, highest, lowest))
+
+
+def moved(d_rx: float = 0.0, d_tx: float = 0.0) -> Scene:
+    pose = SILO3.pose
+    return replace(SILO3, pose=SiloPose(pose.r_x + d_rx, pose.r_y, pose.t_x + d_tx, pose.t_y), seed=77)
+
+
+def errors(found: Calibration, scene: Scene = SILO3) -> np.ndarray:
+    truth = scene.pose
+    assert found.pose is not None
+    return np.array([getattr(found.pose, name) - getattr(truth, name) for name in ("r_x", "r_y", "t_x", "t_y")])
+
+
+def stds(found: Calibration) -> np.ndarray:
+    assert found.covariance is not None
+    return np.sqrt(np.diag(found.covariance))
+
+
+def same(one: Calibration, other: Calibration, share: float = 1e-6, variance: float = 1e-5) -> None:
+    """Equal within a small share of the standard deviation, and with variances equal within a share."""
+    assert one.parameters is not None
+    assert other.parameters is not None
+    assert one.parameter_covariance is not None
+    assert other.parameter_covariance is not None
+    scale = np.sqrt(np.diag(one.parameter_covariance)) + 1e-15
+    assert np.nanmax(np.abs(one.parameters - other.parameters) / scale) < share
+    np.testing.assert_allclose(np.diag(other.parameter_covariance), scale**2, rtol=variance, atol=1e-28)
+
+
+@pytest.mark.parametrize("known", [{}, {"sensor": None, "diameter": 3.0}, {"sensor": None}])
+def test_the_order_of_the_frames_does_not_matter(known: dict[str, Any]) -> None:
+    frames = list(sequence(**known))
+    shuffled = [frames[k] for k in np.random.default_rng(3).permutation(len(frames))]
+    same(calibrate(frames), calibrate(shuffled))
+
+
+def test_one_frame_gives_back_what_the_frame_said() -> None:
+    frame = sequence()[-1]
+    found = calibrate([frame])
+    assert frame.pose is not None
+    assert frame.covariance is not None
+    assert found.pose is not None
+    for name, std in zip(("r_x", "r_y", "t_x", "t_y"), stds(found), strict=True):
+        assert getattr(found.pose, name) == pytest.approx(getattr(frame.pose, name), abs=0.02 * std)
+    np.testing.assert_allclose(found.covariance, frame.covariance, rtol=1e-3, atol=1e-14)
+    assert "few-frames" in found.quality
+
+
+def test_the_same_frame_many_times_is_no_surer_where_frames_share_their_error() -> None:
+    frame = located(SILO3, sensor=None)
+    one, many = calibrate([frame]), calibrate([frame] * 20)
+    assert one.silo_std.apex is not None
+    assert many.silo_std.apex is not None
+    assert many.silo_std.apex > 0.9 * one.silo_std.apex  # the scale is not known, however many frames there are
+    assert stds(many)[0] < 0.9 * stds(one)[0]
+
+
+def test_noise_averages_down() -> None:
+    frames = sequence()
+    last, found = frames[-1], calibrate(frames)
+    assert last.covariance is not None
+    assert (stds(found) < 0.6 * np.sqrt(np.diag(last.covariance))).all()
+    assert (np.abs(errors(found)) < 4.0 * stds(found)).all()
+
+
+def test_one_frame_of_another_pose_is_rejected() -> None:
+    frames = list(sequence())
+    clean = calibrate(frames)
+    found = calibrate([*frames[:3], located(moved(d_tx=0.02)), *frames[3:]])
+    assert [record.status for record in found.frames].index("rejected") == 3
+    assert found.counts["rejected"] == 1
+    assert found.moved_at is None
+    same(clean, found, share=0.05, variance=0.2)
+
+
+def test_continuing_equals_doing_at_once(tmp_path: Path) -> None:
+    frames = sequence()
+    calibrate(frames[:3]).save(tmp_path / "first.json")
+    middle = calibrate(frames[3:6], continue_from=tmp_path / "first.json")
+    found = calibrate(frames[6:], continue_from=middle)
+    same(calibrate(frames), found)
+    assert [record.index for record in found.frames] == list(range(len(frames)))
+
+
+def test_old_frames_are_added_up_without_loss(monkeypatch: pytest.MonkeyPatch) -> None:
+    frames = sequence()
+    at_once = calibrate(frames)
+    monkeypatch.setattr(sys.modules["siloscope.calibrate"], "KEPT", 2)
+    found = calibrate(frames[4:], continue_from=calibrate(frames[:4]))
+    assert len(found.evidence.frames) == 2
+    assert found.evidence.earlier is not None
+    assert found.evidence.earlier.frames == len(frames) - 2
+    same(at_once, found, share=0.2, variance=0.2)
+
+
+def test_the_frame_from_which_on_the_camera_has_moved_is_found() -> None:
+    after = moved(d_rx=0.002, d_tx=0.003)
+    frames = [*sequence(), *(located(scene) for scene in discharge(after, 4, 0.3, 0.1))]
+    found = calibrate(frames)
+    assert found.moved_at is not None
+    assert found.moved_at.index == len(sequence())
+    assert found.moved_at.shift == pytest.approx(0.003, rel=0.1)
+    assert found.moved_at.turn == pytest.approx(0.002, rel=0.1)
+    assert found.counts["before-move"] == len(sequence())
+    assert "camera-moved" in found.quality
+    assert (np.abs(errors(found, after)) < 4.0 * stds(found)).all()
+
+
+def test_a_move_shows_when_the_calibration_is_continued() -> None:
+    earlier = calibrate(sequence())
+    after = [located(scene) for scene in discharge(moved(d_tx=0.01), 4, 0.3, 0.1)]
+    assert calibrate(after[:2], continue_from=earlier).moved_at is None
+    found = calibrate(after[2:], continue_from=calibrate(after[:2], continue_from=earlier))
+    assert found.moved_at is not None
+    assert found.moved_at.index == len(sequence())
+
+
+def test_a_still_camera_has_not_moved() -> None:
+    for known in ({}, {"sensor": None, "diameter": 3.0}, {"sensor": None}):
+        assert calibrate(sequence(**known)).moves == ()
+
+
+def test_geometry_grows_as_it_comes_into_view() -> None:
+    frames = [located(scene) for scene in discharge(replace(scenario("silo1"), sensor=ASTRA_S), 8, 0.6, 0.0)]
+    high = calibrate(frames[:3])
+    assert high.silo.radius == pytest.approx(1.25, abs=1e-3)
+    assert high.silo.apex is None
+    assert "cone-not-seen" in high.quality
+    whole = calibrate(frames[3:], continue_from=high)
+    assert whole.silo.apex == pytest.approx(5.5, abs=2e-3)
+    assert whole.silo_std.radius is not None
+    assert high.silo_std.radius is not None
+    assert whole.silo_std.radius < high.silo_std.radius
+
+
+def test_scatter_beyond_what_is_stated_widens_the_covariance() -> None:
+    frames = sequence()
+    calm = calibrate(frames)
+    shaken = calibrate([_shaken(frame, k) for k, frame in enumerate(frames)])
+    assert calm.excess < 2.0
+    assert shaken.excess > 30.0
+    assert (stds(shaken) > 3.0 * stds(calm)).all()
+    assert "frames-scatter" in shaken.quality
+
+
+def _shaken(frame: Estimate, number: int) -> Estimate:
+    """The frame's answer moved by 8 of its standard deviations in every direction, alternately."""
+    evidence = frame.evidence
+    assert evidence is not None
+    assert frame.covariance is not None
+    parameters = evidence.parameters.copy()
+    parameters[:4] += np.random.default_rng(number).normal(0.0, 8.0, 4) * np.sqrt(np.diag(frame.covariance))
+    return replace(frame, evidence=replace(evidence, parameters=parameters))
+
+
+def test_the_papers_rule_is_the_mean_of_the_last_ten() -> None:
+    frames = (*sequence(), *sequence(6))
+    found = calibrate(frames, rule="mean-of-last-10")
+    assert found.pose is not None
+    means = [np.mean([getattr(f, name) for f in frames[-10:]]) for name in ("r_x", "r_y", "t_x", "t_y")]
+    np.testing.assert_allclose([found.pose.r_x, found.pose.r_y, found.pose.t_x, found.pose.t_y], means, rtol=1e-14)
+    assert found.counts["not-averaged"] == len(frames) - 10
+
+
+def test_frames_that_show_no_wall_are_refused_and_told() -> None:
+    full = [located(scene) for scene in discharge(SILO3, 2, 0.9, 0.85)]
+    found = calibrate(full)
+    assert found.status == "refused"
+    assert found.reason == "no-frame-answers"
+    assert found.pose is None
+    assert found.message is not None
+    assert "no-wall" in found.message
+    mixed = calibrate([*full, *sequence()])
+    assert mixed.ok
+    assert mixed.counts["refused"] == 2
+
+
+def test_wrong_settings_are_told() -> None:
+    with pytest.raises(UsageError, match="unknown rule"):
+        calibrate(sequence(), rule="median")
+    with pytest.raises(UsageError, match="jobs"):
+        calibrate(sequence(), jobs=0)
+    with pytest.raises(UsageError, match="different sensor profiles"):
+        calibrate([*sequence(), located(SILO3, "realsense-d435"), located(SILO3, None)])
+    with pytest.raises(UsageError, match="another diameter"):
+        calibrate(sequence(), diameter=2.0, continue_from=calibrate(sequence()))
+    bare = [replace(frame, evidence=None) for frame in sequence()]
+    with pytest.raises(UsageError, match="mean-of-last-10"):
+        calibrate(bare)
+
+
+def test_a_calibration_file_comes_back_as_it_was(tmp_path: Path) -> None:
+    for frames in (sequence(), sequence(sensor=None), [located(scene) for scene in discharge(SILO3, 1, 0.9)]):
+        found = calibrate(frames)
+        found.save(tmp_path / "silo.json")
+        assert Calibration.load(tmp_path / "silo.json").to_dict() == found.to_dict()
+
+
+def _document() -> dict[str, Any]:
+    document: dict[str, Any] = json.loads(json.dumps(calibrate(sequence()).to_dict()))
+    return document
+
+
+def _changed(keys: Sequence[Any], value: Any) -> str:
+    document = _document()
+    place: Any = document
+    for key in keys[:-1]:
+        place = place[key]
+    place[keys[-1]] = value
+    return json.dumps(document)
+
+
+DAMAGES = {
+    "not JSON": ("{", "damaged"),
+    "a list": ("[]", "no schema"),
+    "deep": ("[" * 100_000, "damaged"),
+    "another schema": ('{"schema": "siloscope.estimate/1"}', "siloscope.estimate/1"),
+    "nearly empty": ('{"schema": "siloscope.calibration/1"}', "'status' is missing"),
+    "status": (["status"], "fine", "known are ok, refused"),
+    "NaN": (["r_x"], float("nan"), "finite"),
+    "text": (["t_x"], "0.1", "'t_x' must be a finite number"),
+    "infinite": (["silo", "radius"], float("inf"), "silo.radius"),
+    "short covariance": (["covariance"], [[1.0]], "4 rows"),
+    "negative variance": (["covariance", 0, 0], -1.0, "negative"),
+    "unsymmetric": (["covariance", 0, 1], 1.0, "symmetric"),
+    "names": (["parameters", "names"], ["r_x"], "parameters.names"),
+    "excess": (["excess"], 0.5, "at least 1"),
+    "code": (["quality"], ["splendid"], "splendid"),
+    "record": (["frames", 2], 7, "frames[2]"),
+    "record's status": (["frames", 2, "status"], "lost", "frames[2].status"),
+    "record's index": (["frames", 2, "index"], -1, "frames[2].index"),
+    "evidence": (["evidence", "frames", 1, "information"], [0.0], "55 numbers"),
+    "evidence's free": (["evidence", "frames", 1, "free"], [1] * 10, "evidence.frames[1].free"),
+    "evidence's hole": (["evidence", "frames", 1, "parameters", 0], None, "lacks a value"),
+    "sums": (["evidence", "earlier"], [], "evidence.earlier"),
+    "config": (["config"], None, "config"),
+}
+
+
+@pytest.mark.parametrize("name", DAMAGES)
+def test_damaged_calibration_files_are_refused_by_name(name: str, tmp_path: Path) -> None:
+    *content, told = DAMAGES[name]
+    path = tmp_path / "silo.json"
+    path.write_text(content[0] if len(content) == 1 else _changed(*content))
+    with pytest.raises(InputError) as refused:
+        Calibration.load(path)
+    assert str(path) in str(refused.value)
+    assert told in str(refused.value)
+
+
+def test_missing_calibration_files_are_told(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="can't be read"):
+        Calibration.load(tmp_path / "none.json")
+    with pytest.raises(InputError, match="can't be read"):
+        Calibration.load(tmp_path)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Six frames of a discharge and their camera, as files."""
+    from siloscope import camera_files
+    from siloscope.writers import write_png
+
+    place = tmp_path_factory.mktemp("frames")
+    for number, scene in enumerate(discharge(SILO3, 6, 0.9, 0.1)):
+        write_png(place / f"{number:02}.png", scene.render().raw(1e-4))
+    camera_files.dump(SILO3.camera, place / "camera.json")
+    return place
+
+
+def run(*arguments: Any) -> int:
+    return main(["calibrate", *map(str, arguments)])
+
+
+def test_the_command_writes_the_calibration(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    terms = ["--depth-unit", "0.0001", "--sensor", "orbbec-astra-s", "--camera", folder / "camera.json", "--json"]
+    out = tmp_path / "silo.json"
+    assert run(*sorted(folder.glob("*.png")), *terms, "-o", out) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["schema"] == "siloscope.calibration/1"
+    assert document == json.loads(out.read_text())
+    assert document["counts"]["refused"] >= 1
+    assert document["r_x"] == pytest.approx(SILO3.pose.r_x, abs=2e-4)
+    again = tmp_path / "again.json"
+    assert run(*sorted(folder.glob("*.png"))[-2:], *terms, "--continue", out, "-o", again, "--jobs", 1) == 0
+    assert len(Calibration.load(again).frames) == 8
+
+
+def test_the_command_tells_what_failed(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    terms = ["--depth-unit", "0.0001", "--sensor", "orbbec-astra-s", "--camera", folder / "camera.json"]
+    out = tmp_path / "silo.json"
+    broken = tmp_path / "broken.png"
+    broken.write_bytes((folder / "05.png").read_bytes()[:5000])
+    assert run(folder / "05.png", folder / "04.png", broken, *terms, "-o", out) == 5
+    assert Calibration.load(out).counts["unreadable"] == 1
+    assert run(folder / "00.png", *terms, "-o", out) == 4
+    assert Calibration.load(out).reason == "no-frame-answers"
+    assert run(broken, *terms, "-o", out) == 3
+    assert run(folder / "05.png", *terms, "-o", tmp_path / "no" / "silo.json") == 2
+    assert run(folder / "05.png", *terms, "-o", out, "--rule", "median") == 2
+    assert "Traceback" not in capsys.readouterr().err
