@@ -13,6 +13,7 @@ from siloscope import Camera, SiloPose, UsageError, _core
 from siloscope.paper.metrics import (
     area_ratios,
     camera_points,
+    cloud_distance,
     pc_average_distance,
     pixel_areas,
     pixel_ratios,
@@ -77,6 +78,14 @@ def test_unusable_frames_are_refused() -> None:
             pc_average_distance(pose, pose, depth, SMALL)
     with pytest.raises(UsageError, match="stride"):
         pc_average_distance(pose, pose, np.ones((72, 96)), SMALL, stride=0)
+
+
+def test_clouds_that_can_t_be_compared_are_refused() -> None:
+    cloud = np.random.default_rng(1).normal(size=(20, 3))
+    assert cloud_distance(cloud, cloud) == 0.0
+    for points, reference in [(cloud[:0], cloud), (cloud, cloud[:0]), (cloud, cloud[:, :2]), (cloud * np.nan, cloud)]:
+        with pytest.raises(UsageError, match="compare"):
+            cloud_distance(points, reference)
 
 
 def test_a_closed_room_s_pixel_areas_sum_to_its_surface() -> None:

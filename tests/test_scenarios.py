@@ -69,6 +69,11 @@ def test_table_2_as_printed_looks_away_and_negated_looks_at_the_axis() -> None:
     assert miss("silo-r1-printed") > 1.4
 
 
+def test_names_may_be_written_as_in_the_paper() -> None:
+    assert scenario("Silo1") == SILO1
+    assert scenario("SiloR1") == scenario("silo-r1")
+
+
 def test_the_comparison_has_the_turns_of_table_7_and_the_sensors_own_cameras() -> None:
     d455 = scenario("comparison-d455")
     assert (d455.pose.r_x, d455.pose.r_y) == (0.07588, 0.31265)

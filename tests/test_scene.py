@@ -160,6 +160,15 @@ def test_the_noise_has_the_law_s_mean_and_deviation_at_every_depth(sensor: Senso
         assert abs(bin_scores.std() - 1) < 4 / math.sqrt(2 * n)
 
 
+def test_measuring_again_is_rendering_with_another_seed_or_sensor() -> None:
+    frame = small(SILO2, sensor=ASTRA_S, seed=1).render()
+    again = frame.measured_again(2)
+    assert np.array_equal(again.measured, small(SILO2, sensor=ASTRA_S, seed=2).render().measured)
+    assert (again.scene.seed, again.depth is frame.depth) == (2, True)
+    perfect = frame.measured_again(2, SensorModel())
+    assert np.array_equal(perfect.measured, frame.depth)
+
+
 def test_an_empty_silo_holds_nothing_and_a_flat_one_what_geometry_says() -> None:
     silo = Silo(1.5, 3.0, 2.0)
     assert content_of(silo, None).volume == 0.0
@@ -305,6 +314,12 @@ def test_impossible_feeds_are_refused(feed: Feed) -> None:
 def test_unknown_feed_shapes_are_refused(shape: str) -> None:
     with pytest.raises(UsageError, match="feed shape"):
         Feed(shape)
+
+
+@pytest.mark.parametrize("part", ["silo", "pose", "camera", "feed", "sensor", "defects", "seed", "world"])
+def test_parts_of_another_kind_are_refused_by_name(part: str) -> None:
+    with pytest.raises(UsageError, match=part):
+        replace(SILO1, **{part: 1.5})
 
 
 def test_a_buried_or_outside_camera_and_bad_threads_are_refused() -> None:

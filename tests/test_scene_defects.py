@@ -135,6 +135,16 @@ def test_film_on_the_wall_is_feed() -> None:
     assert (frame.labels == 3).any()
 
 
+def test_an_oval_silo_has_its_outlet_too() -> None:
+    silo = replace(SILO1.silo, outlet_radius=0.25, outlet_offset=(0.1, 0.05))
+    camera = replace(SMALL, fx=300.0, fy=300.0)
+    frame = replace(SILO1, silo=silo, camera=camera, feed=None, defects=Defects(ovality=0.01)).render()
+    x, y, z = silo_points(frame)[frame.labels == 4].T
+    on_pipe, on_end = np.abs(np.hypot(x - 0.1, y - 0.05) - 0.25) < 1e-12, np.abs(z - 5.8) < 1e-12
+    assert np.all(on_pipe | on_end)
+    assert on_end.sum() > 100
+
+
 def bar_distance(points: np.ndarray, bar: tuple[float, ...]) -> np.ndarray:
     a, b = np.array(bar[:3]), np.array(bar[3:6])
     share = np.clip((points - a) @ (b - a) / np.dot(b - a, b - a), 0, 1)

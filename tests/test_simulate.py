@@ -77,11 +77,13 @@ def test_own_silo_camera_and_defects(tmp_path: Path) -> None:
         replace(SILO2.camera, width=80, height=60, fx=70.0, fy=70.0, cx=39.5, cy=29.5), tmp_path / "c.json"
     )
     silo = ["--radius", "1.1", "--cylinder", "2.5", "--cone", "1.4", "--outlet", "0.15", "--feed", "none"]
+    silo += ["--outlet-offset", "0.1,-0.1"]
     more = ["--camera", str(tmp_path / "c.json"), "--fx", "75", "--defects", "corrugated,ladder", "--dropout", "0.3"]
     assert main(["simulate", "--out", str(out), *silo, *more, "--max-incidence", "80"]) == 0
     document = json.loads((out / "truth.json").read_text())
     assert document["frames"][0]["silo"] == {"radius": 1.1, "cylinder_bottom": 2.5, "apex": 3.9}
     assert document["scene"]["defects"]["corrugation_depth"] == 0.013
+    assert document["scene"]["silo"]["outlet_offset"] == [0.1, -0.1]
     assert document["scene"]["camera"]["fx"] == 75.0
     raw = np.asarray(Image.open(out / "frame_0000.png"))
     assert raw.shape == (60, 80)
@@ -92,8 +94,11 @@ def test_own_silo_camera_and_defects(tmp_path: Path) -> None:
     ("options", "cause"),
     [
         (["--scenario", "silo9"], "unknown scenario"),
-        (["--pose", "1,2,3"], "four numbers"),
-        (["--pose", "a,b,c,d"], "four numbers"),
+        (["--pose", "1,2,3"], "4 numbers"),
+        (["--pose", "a,b,c,d"], "4 numbers"),
+        (["--pose", "nan,0,0,0"], "r_x"),
+        (["--outlet-offset", "1"], "2 numbers"),
+        (["--outlet-offset", "1.3,0"], "outlet_offset"),
         (["--pose", "0,0,9,0"], "inside the silo"),
         (["--feed", "sand"], "feed shape"),
         (["--level", "1.5"], "level"),

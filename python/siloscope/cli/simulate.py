@@ -41,6 +41,7 @@ def simulate(
     cylinder: Annotated[float | None, typer.Option(help="Height of the cylinder, m.")] = None,
     cone: Annotated[float | None, typer.Option(help="Height of the cone, m.")] = None,
     outlet: Annotated[float | None, typer.Option(help="Radius of the outlet pipe, m.")] = None,
+    outlet_offset: Annotated[str | None, typer.Option(help="Offset x,y of the outlet from the axis, m.")] = None,
     pose: Annotated[str | None, typer.Option(help="r_x,r_y,t_x,t_y in rad and m.")] = None,
     feed: Annotated[str | None, typer.Option(help=_FEED.help)] = None,
     level: Annotated[float | None, typer.Option(help=_LEVEL.help)] = None,
@@ -75,6 +76,8 @@ def simulate(
     """
     scene = scenario(scenario_name)
     silo = _given(radius=radius, cylinder_height=cylinder, cone_height=cone, outlet_radius=outlet)
+    if outlet_offset is not None:
+        silo["outlet_offset"] = tuple(_numbers("--outlet-offset", outlet_offset, "x,y in metres", 2))
     scene = replace(scene, silo=replace(scene.silo, **silo), seed=seed)
     scene = replace(scene, pose=_pose(pose) if pose else scene.pose, feed=_feed(scene.feed, feed, level, seed))
     errors = _given(dust=dust, dropout=dropout, flying=flying)
@@ -99,11 +102,17 @@ def _given(**options: Any) -> dict[str, Any]:
 
 
 def _pose(text: str) -> SiloPose:
+    return SiloPose(*_numbers("--pose", text, "r_x,r_y,t_x,t_y in radians and metres", 4))
+
+
+def _numbers(option: str, text: str, meaning: str, count: int) -> list[float]:
     try:
-        r_x, r_y, t_x, t_y = (float(part) for part in text.split(","))
+        numbers = [float(part) for part in text.split(",")]
     except ValueError:
-        raise UsageError(f"--pose '{text}': give four numbers r_x,r_y,t_x,t_y in radians and metres") from None
-    return SiloPose(r_x, r_y, t_x, t_y)
+        numbers = []
+    if len(numbers) != count:
+        raise UsageError(f"{option} '{text}': give {count} numbers {meaning}")
+    return numbers
 
 
 def _feed(current: Feed | None, shape: str | None, level: float | None, seed: int) -> Feed | None:

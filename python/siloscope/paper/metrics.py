@@ -94,8 +94,23 @@ def pc_average_distance(
     if not valid.any():
         raise UsageError("the frame has no pixel with depth to compare")
     points = camera_points(depth, camera)[valid]
-    adjusted, expected = estimate.to_silo(points[::stride]), reference.to_silo(points)
-    return float(_core.nearest_distances(adjusted, expected, threads).mean())
+    return cloud_distance(estimate.to_silo(points[::stride]), reference.to_silo(points), threads)
+
+
+def cloud_distance(points: NDArray[np.float64], reference: NDArray[np.float64], threads: int = 1) -> float:
+    """Mean distance in metres from each point (N, 3) to the nearest of a reference cloud (M, 3) (Eq. 11, Table 6).
+
+    Raises
+    ------
+    UsageError
+        Where a cloud is empty, has another shape, or holds NaN or infinite coordinates.
+    """
+    if len(points) == 0:
+        raise UsageError("there is no point to compare")
+    try:
+        return float(_core.nearest_distances(points, reference, threads).mean())
+    except (TypeError, ValueError) as error:
+        raise UsageError(f"clouds can't be compared: {error}") from None
 
 
 def camera_points(depth: NDArray[np.floating[Any]], camera: Camera) -> NDArray[np.float64]:

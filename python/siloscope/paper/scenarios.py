@@ -130,10 +130,12 @@ sensors of section 2.4.5, big-* silos of industrial size. The rest shows no wall
 
 
 def scenario(name: str) -> Scene:
-    """The scene of a name in `SCENARIOS`; raises `UsageError` for an unknown one."""
-    if name.lower() not in SCENARIOS:
+    """The scene of a name in `SCENARIOS`, also as the paper writes it ("SiloR1"); raises `UsageError` for others."""
+    plain = {known.replace("-", ""): make for known, make in SCENARIOS.items()}
+    make = plain.get(name.lower().replace("-", ""))
+    if make is None:
         raise UsageError(f"unknown scenario '{name}'; known are {', '.join(SCENARIOS)}")
-    return SCENARIOS[name.lower()]()
+    return make()
 
 
 def random_scene(
