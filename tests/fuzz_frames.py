@@ -3,7 +3,7 @@ exception, no hang over two seconds, no memory beyond twice what a file of that 
 
     python -m tests.fuzz_frames --count 10000 [--name depth.png] [--seed 1]
 
-A file that breaks a rule is kept in ``fuzz-failures`` and its name printed; the exit code is then 1.
+A file that breaks a rule is kept in ``fuzz/artifacts`` and its name printed; the exit code is then 1.
 """
 
 from __future__ import annotations
@@ -31,10 +31,24 @@ import frame_files
 import siloscope.frames
 from siloscope import InputError
 
-SEEDS: dict[str, Callable[[], bytes]] = dict(frame_files.MAKERS)
-"""Good files by name; formats with makers of their own add them here."""
+
+def _first_lines(name: str, count: int) -> Callable[[], bytes]:
+    return lambda: b"".join(frame_files.MAKERS[name]().splitlines(keepends=True)[:count])
+
+
+SEEDS: dict[str, Callable[[], bytes]] = {
+    **frame_files.MAKERS,
+    **{
+        name: _first_lines(name, count)
+        for name, count in {"points.xyz": 200, "points.csv": 200, "image.csv": 12}.items()
+    },
+}
+"""Good files by name, the text tables short; formats with makers of their own add them here."""
 
 LONGEST_S = 2.0
+"""Of the processor's time, which a busy machine does not stretch."""
+LONGEST_WAIT_S = 60.0
+"""By the clock, for readers that wait for something that never comes."""
 BEST_RATIO = 1032
 """What deflate, the strongest compression read, can make of a byte."""
 FLOOR_BYTES = 16 << 20
@@ -149,13 +163,16 @@ def _time_limit() -> Iterator[None]:
     def too_long(*_: object) -> None:
         raise Hang
 
-    before = signal.signal(signal.SIGALRM, too_long)
-    signal.setitimer(signal.ITIMER_REAL, LONGEST_S)
+    kinds = ((signal.SIGPROF, signal.ITIMER_PROF, LONGEST_S), (signal.SIGALRM, signal.ITIMER_REAL, LONGEST_WAIT_S))
+    before = [(number, timer, signal.signal(number, too_long)) for number, timer, _ in kinds]
+    for _, timer, seconds in kinds:
+        signal.setitimer(timer, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0)
-        signal.signal(signal.SIGALRM, before)
+        for number, timer, handler in before:
+            signal.setitimer(timer, 0)
+            signal.signal(number, handler)
 
 
 def fuzz(name: str, count: int, seed: int, folder: Path) -> Iterator[tuple[bytes, str]]:
@@ -182,8 +199,8 @@ def main() -> int:
         with tempfile.TemporaryDirectory() as folder:
             for data, rule in fuzz(name, wanted.count, wanted.seed, Path(folder)):
                 failures += 1
-                kept = Path("fuzz-failures") / f"{zlib.crc32(data):08x}-{name}"
-                kept.parent.mkdir(exist_ok=True)
+                kept = Path("fuzz/artifacts") / f"{zlib.crc32(data):08x}-{name}"
+                kept.parent.mkdir(parents=True, exist_ok=True)
                 kept.write_bytes(data)
                 print(f"{kept}: {rule}")
         print(f"{name}: {wanted.count} mutations in {time.perf_counter() - started:.0f} s")

@@ -59,11 +59,11 @@ def test_every_picture_shows_something(seen: SimulatedFrame) -> None:
 
 def test_pictures_survive_what_was_not_seen(seen: SimulatedFrame) -> None:
     points, labels = cloud(seen)
-    for silo in (SiloGeometry(), SiloGeometry(1.5), SiloGeometry(1.5, 1.9, None)):
-        for few in (points[:0], points[:1], points[:300]):
-            plots.png(plots.clouds(few, few, seen.pose, silo), dpi=30)
-            plots.png(plots.profile(seen.pose.to_silo(few), labels[: len(few)] == 1, silo), dpi=30)
-            plots.png(plots.candidates(few, labels[: len(few)] == 1, seen.pose, silo), dpi=30)
+    known = (SiloGeometry(), SiloGeometry(1.5), SiloGeometry(1.5, 1.9, None))
+    for silo, few in zip(known, (points[:0], points[:1], points[:300]), strict=True):
+        plots.png(plots.clouds(few, few, seen.pose, silo), dpi=30)
+        plots.png(plots.profile(seen.pose.to_silo(few), labels[: len(few)] == 1, silo), dpi=30)
+        plots.png(plots.candidates(few, labels[: len(few)] == 1, seen.pose, silo), dpi=30)
     plots.png(plots.depth_map(np.full((4, 5), np.nan)), dpi=30)
     plots.png(plots.directions(np.zeros((0, 3)), seen.pose.axis_direction), dpi=30)
 

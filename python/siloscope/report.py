@@ -58,11 +58,14 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return f'<div class="wide"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
-def picture(png: bytes, caption: str) -> str:
+def picture(png: bytes, caption: str, narrow: bool = False) -> str:
     """A picture inside the page; the caption is also its text for those who can't see it."""
     data = base64.b64encode(png).decode("ascii")
     shown = escape(caption)
-    return f'<figure><img src="data:image/png;base64,{data}" alt="{shown}"><figcaption>{shown}</figcaption></figure>'
+    kind = ' class="narrow"' if narrow else ""
+    return (
+        f'<figure{kind}><img src="data:image/png;base64,{data}" alt="{shown}"><figcaption>{shown}</figcaption></figure>'
+    )
 
 
 def command(lines: str) -> str:

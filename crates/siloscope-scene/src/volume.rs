@@ -44,16 +44,16 @@ impl Sums {
     }
 }
 
-/// Content by the trapezoid rule over the angle, spokes doubled until the volume stands to 1e-8 of itself.
+/// Content by the trapezoid rule over the angle, spokes doubled until the volume stands to 1e-7 of itself.
 pub fn content(feed: &Feed) -> Content {
     let mut spokes = 32;
     let mut sums = around(feed, spokes, 0.0);
-    while spokes < 1 << 14 {
+    while spokes < 1 << 12 {
         let between = around(feed, spokes, 0.5);
         let finer = sums.plus(between).times(0.5);
         let change = (finer.volume - sums.volume).abs();
         (sums, spokes) = (finer, 2 * spokes);
-        if change <= 1e-8 * sums.volume {
+        if change <= 1e-7 * sums.volume {
             break;
         }
     }

@@ -78,7 +78,9 @@ impl Wall {
         }
         let change = at_height(bottom).max(0.0);
         let cylinder = self.cast_zone(origin, ray, Zone::Cylinder, 0.0, change);
-        cylinder.or_else(|| self.cast_zone(origin, ray, Zone::Cone, change, at_height(apex)))
+        let cone = || self.cast_zone(origin, ray, Zone::Cone, change, at_height(apex));
+        let vertex = || Hit { t: at_height(apex), normal: -Vec3::z(), label: Label::Cone };
+        cylinder.or_else(cone).or_else(|| Some(vertex()))
     }
 
     fn cast_zone(&self, origin: &Vec3, ray: &Vec3, zone: Zone, start: f64, end: f64) -> Option<Hit> {

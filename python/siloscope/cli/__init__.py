@@ -33,6 +33,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("calibrate", "calibrate:calibrate", "Fuse many frames to the silo's calibration: pose and geometry."),
     Command("demo", "demo:demo", "Simulate a discharge, find the axis in every frame, write a report: the first run."),
     Command("locate", "locate:locate", "Find the silo's axis and the camera's pose in one frame."),
+    Command("info", "info:info", "Show what is inside a recording, image, array, cloud or folder."),
+    Command("convert", "convert:convert", "Extract frames with their camera, times, gravity and provenance."),
     Command("simulate", "simulate:simulate", "Write depth frames of a simulated silo, with their exact truth."),
 )
 

@@ -50,7 +50,7 @@ def locate(
     """
     with siloscope.frames.open(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
         frame = options.one_frame(source, number)
-        several = len(source) > 1
+        several = source.frame_count != 1
     if several and not as_json:
         say(f"{frame.source}; choose another with --frame")
     chosen = selection(frame, mask, label, crop)

@@ -108,7 +108,19 @@ def _discharge(steps: Sequence[Step]) -> list[str]:
             [[name, *_spread(values)] for name, values in distance.items()],
         ),
         text("PC average distance (Eq. 11): the mean distance of the cloud as found from the cloud as it truly lies."),
+        *_refusals(steps),
     ]
+
+
+def _refusals(steps: Sequence[Step]) -> list[str]:
+    """Why the surface fit gave no answer, and at which feed levels."""
+    levels: dict[str, list[float]] = {}
+    for step in steps:
+        estimate = step.estimates["surface"]
+        if not estimate.ok:
+            levels.setdefault(estimate.message or "", []).append(step.level)
+    rows = [[message, str(len(at)), f"{max(at):.0%} to {min(at):.0%}"] for message, at in levels.items()]
+    return [text("Where it refused, and what it said:"), table(["", "frames", "feed level"], rows)] if rows else []
 
 
 def _spread(distance: NDArray[np.float64]) -> list[str]:
@@ -120,7 +132,7 @@ def _spread(distance: NDArray[np.float64]) -> list[str]:
 
 def _how(shown: dict[str, Any]) -> list[str]:
     texts = {"depth": _DEPTH, "candidates": _CANDIDATES, "directions": _DIRECTIONS, "profile": _PROFILE}
-    return [_png(shown[name], caption) for name, caption in texts.items() if name in shown]
+    return [_png(shown[name], caption, name == "depth") for name, caption in texts.items() if name in shown]
 
 
 def _meaning(steps: Sequence[Step]) -> list[str]:
@@ -168,8 +180,8 @@ def _mm(value: float) -> str:
     return f"{value:.2g} mm" if value < 10 else f"{value:.0f} mm"
 
 
-def _png(figure: Any, caption: str) -> str:
-    return picture(plots.png(figure, dpi=_DPI), caption)
+def _png(figure: Any, caption: str, narrow: bool = False) -> str:
+    return picture(plots.png(figure, dpi=_DPI), caption, narrow)
 
 
 _CLOUDS = (

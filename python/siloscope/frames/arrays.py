@@ -16,7 +16,7 @@ MAGIC = b"\x93NUMPY"
 _LONGEST_HEADER = 10_000
 _DTYPE = re.compile(r"'descr'\s*:\s*'([<>|=]?)([a-zA-Z])(\d+)'")
 _ORDER = re.compile(r"'fortran_order'\s*:\s*(True|False)")
-_SHAPE = re.compile(r"'shape'\s*:\s*\(([\d\s,]*)\)")
+_SHAPE = re.compile(r"'shape'\s*:\s*\(((?: *\d{1,20} *(?:,|(?=\)))){0,8} *)\)", re.ASCII)
 _NUMBERS = {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}
 
 
@@ -80,22 +80,30 @@ def stored_array(file: IO[bytes], name: str, size: int, *, text: bool = False) -
     Raises `InputError` for objects (which would run code when read), structures and other dtypes that are no
     numbers; `text` also allows strings.
     """
-    try:
-        start = file.read(12)
-    except Exception as error:  # as above
-        raise InputError(f"{name}: can't be decompressed ({error}); save it again") from None
-    wide = start[6:7] != b"\x01"
-    offset = 12 if wide else 10
-    length = int.from_bytes(start[8:offset], "little")
-    if len(start) < 12 or not start.startswith(MAGIC) or length > _LONGEST_HEADER or offset + length > size:
-        raise InputError(f"{name}: the array's header is damaged; save it again with numpy.save")
-    header = (start[offset:] + file.read(length - (12 - offset))).decode("latin-1")
+    header, offset = _header(file, name, size)
     order, shape = _ORDER.search(header), _SHAPE.search(header)
     if order is None or shape is None:
-        raise InputError(f"{name}: the array's header is damaged; save it again with numpy.save")
-    sides = tuple(int(side) for side in shape[1].split(",") if side.strip())
+        raise _damaged(name)
+    sides = tuple(int(side) for side in shape[1].split(",") if side.strip(" "))
     dtype = _dtype(name, header, text)
-    return StoredArray(file, name, sides, dtype, order[1] == "True", offset + length, size - offset - length)
+    return StoredArray(file, name, sides, dtype, order[1] == "True", offset, size - offset)
+
+
+def _header(file: IO[bytes], name: str, size: int) -> tuple[str, int]:
+    """The header's text and where the values start."""
+    try:
+        start = file.read(_LONGEST_HEADER)
+    except Exception as error:  # as above
+        raise InputError(f"{name}: can't be decompressed ({error}); save it again") from None
+    first = 10 if start[6:7] == b"\x01" else 12
+    offset = first + int.from_bytes(start[8:first], "little")
+    if not start.startswith(MAGIC) or len(start) < first or offset > min(size, _LONGEST_HEADER):
+        raise _damaged(name)
+    return start[first:offset].decode("latin-1"), offset
+
+
+def _damaged(name: str) -> InputError:
+    return InputError(f"{name}: the array's header is damaged; save it again with numpy.save")
 
 
 def _dtype(name: str, header: str, text: bool) -> np.dtype[Any]:

@@ -43,7 +43,8 @@ class CloudSource(FrameSource):
     @cached_property
     def _recovered(self) -> Camera | None:
         try:
-            return self._read(self.path).camera
+            with np.errstate(all="ignore"):
+                return self._read(self.path).camera
         except InputError:
             return None  # told where the frame itself is asked for
 

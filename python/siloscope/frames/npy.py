@@ -26,7 +26,7 @@ from siloscope.frames.source import Format, FrameSource, Item, Options, check_im
 
 ZIP_MAGIC = b"PK\x03\x04"
 DEPTH_NAMES = ("depth", "depths", "depth_image", "points", "xyz")
-BESIDE_NAMES = ("depth_unit", "camera", "K", "labels", "timestamps", "gravity")
+BESIDE_NAMES = ("depth_unit", "camera", "K", "labels", "timestamps", "gravity", "provenance")
 _BEST_DEFLATE_RATIO = 1032
 _LARGEST_BESIDE = 1 << 20
 _SMALLEST_SIDE = 8

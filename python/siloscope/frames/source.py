@@ -161,6 +161,11 @@ class FrameSource(ABC):
         known = (self.options.depth_unit, self.options.camera_depth_unit, self.file_depth_unit)
         return next((unit for unit in known if unit is not None), None)
 
+    @property
+    def frame_count(self) -> int | None:
+        """Number of frames, where it is known without reading them all; `len` raises `TypeError` where it is not."""
+        return self._count()
+
     def __len__(self) -> int:
         count = self._count()
         if count is None:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from numpy.typing import NDArray
 
 from siloscope.plots.style import AMBER, BLUE, CLASS_COLOURS, INK, MUTED, PURPLE, RED, figure, heading, legend, tidy
@@ -25,7 +26,8 @@ def errors(level: Numbers, error: Numbers, std: Numbers | None = None, title: st
     for axes, columns, names, unit in ((turns, (0, 1), ("r_x", "r_y"), "mrad"), (shifts, (2, 3), ("t_x", "t_y"), "mm")):
         for column, name, colour in zip(columns, names, (BLUE, AMBER), strict=True):
             spread = None if std is None else 2e3 * std[:, column]
-            _curve(axes, 100.0 * level, 1e3 * error[:, column], spread, f"{name[0]}$_{name[2]}$", colour)
+            shown = f"{name[0]}$_{name[2]}$"
+            _curve(axes, 100.0 * level, 1e3 * error[:, column], spread, shown, colour, name[2] == "y")
         axes.axhline(0.0, color=INK, linewidth=0.9)
         _refused(axes, 100.0 * level, np.isnan(error[:, columns[0]]))
         tidy(axes, f"{'rotation' if unit == 'mrad' else 'translation'} error ({unit})", "feed level (% of the height)")
@@ -51,6 +53,7 @@ def ratios(
         off.semilogy(100.0 * level, 1e3 * distance, color=colour, marker="o", markersize=3.5, linewidth=1.6, label=name)
     _refused(off, 100.0 * level, np.all([np.isnan(distance) for distance in distances.values()], axis=0))
     tidy(off, "PC average distance (mm), Eq. 11", "feed level (% of the height)")
+    _plain_decades(off)
     for axes in (parts, off):
         _runs_down(axes, level)
     legend(parts)
@@ -59,10 +62,19 @@ def ratios(
     return made
 
 
-def _curve(axes: Axes, x: Numbers, y: Numbers, spread: Numbers | None, label: str, colour: str) -> None:
+def _plain_decades(axes: Axes) -> None:
+    """0.1, 0.2, 0.5, 1 … on a logarithmic axis, instead of powers of ten."""
+    axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+
+
+def _curve(axes: Axes, x: Numbers, y: Numbers, spread: Numbers | None, label: str, colour: str, named: bool) -> None:
     axes.plot(x, y, color=colour, marker="o", markersize=3.5, linewidth=1.5, label=label)
     if spread is not None:
-        axes.fill_between(x, y - spread, y + spread, color=colour, alpha=0.18, linewidth=0, label=f"{label} ± 2 std")
+        axes.fill_between(
+            x, y - spread, y + spread, color=colour, alpha=0.18, linewidth=0, label="± 2 std" if named else ""
+        )
 
 
 def _refused(axes: Axes, x: Numbers, refused: NDArray[np.bool_]) -> None:

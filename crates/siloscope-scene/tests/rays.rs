@@ -1,0 +1,175 @@
+//! Rays end on a surface, and nothing lies before it: any silo, any feed, any wall, any direction.
+
+use proptest::prelude::*;
+use siloscope::Vec3;
+use siloscope_scene::feed::{Base, Lumps, Shape};
+use siloscope_scene::{
+    Corrugation, Dent, Feed, Film, Label, Rathole, Relief, Seams, Silo, SiloWorld, Wall, World, volume,
+};
+
+fn silos() -> impl Strategy<Value = Silo> {
+    (0.5..3.0f64, 0.0..5.0f64, 0.3..3.0f64, -1.0..0.0f64).prop_map(|(radius, above, cone_height, top)| Silo {
+        radius,
+        cylinder_height: above - top,
+        cone_height,
+        top,
+        roof: false,
+        outlet_radius: 0.0,
+        outlet_length: 0.0,
+        outlet_offset: [0.0; 2],
+    })
+}
+
+fn bases() -> impl Strategy<Value = Base> {
+    prop_oneof![
+        Just(Base::Flat),
+        Just(Base::Gaussian),
+        (-1.5..1.5f64, 0.02..0.5f64).prop_map(|(tangent, tip)| Base::Conical(tangent, tip)),
+    ]
+}
+
+/// Base, centre, tilt, lumps and rathole for a silo of radius 1.
+type Plan = (Base, [f64; 2], [f64; 2], Option<(f64, f64, u64)>, Option<Rathole>);
+
+fn shapes() -> impl Strategy<Value = Plan> {
+    let pair = |size: f64| proptest::array::uniform2(-size..size);
+    let lumps = proptest::option::of((0.01..0.2f64, 0.1..1.0f64, 0..1000u64));
+    let hole = (pair(0.6), 0.1..0.5f64, 0.1..2.0f64);
+    let hole = proptest::option::of(hole.prop_map(|(centre, radius, depth)| Rathole { centre, radius, depth }));
+    (bases(), pair(0.5), pair(0.5), lumps, hole)
+}
+
+fn shape_for(radius: f64, (base, centre, tilt, lumps, hole): Plan) -> Shape {
+    Shape {
+        radius,
+        base,
+        centre: centre.map(|x| x * radius),
+        tilt,
+        lumps: lumps.and_then(|(height, pitch, seed)| Lumps::new(height * radius, pitch * radius, radius, seed).ok()),
+        ratholes: hole
+            .into_iter()
+            .map(|hole| Rathole { centre: hole.centre.map(|x| x * radius), radius: hole.radius * radius, ..hole })
+            .collect(),
+    }
+}
+
+fn directions() -> impl Strategy<Value = Vec3> {
+    (-1.0..1.0f64, -1.0..1.0f64, -0.5..1.0f64)
+        .prop_map(|(x, y, z)| Vec3::new(x, y, z))
+        .prop_filter("a direction", |ray| ray.norm() > 0.1)
+}
+
+/// A place in the silo at the camera's height.
+fn origin_in(silo: &Silo, share: f64, azimuth: f64) -> Vec3 {
+    let widest = silo.radius.min(silo.slope() * silo.apex());
+    Vec3::new(share * widest * azimuth.cos(), share * widest * azimuth.sin(), 0.0)
+}
+
+/// How far a point is inside the silo's air; negative behind a surface.
+fn clearance(silo: &Silo, feed: Option<&Feed>, p: &Vec3) -> f64 {
+    let wall = silo.radius.min(silo.slope() * (silo.apex() - p.z)) - p.xy().norm();
+    let above = feed.map_or(f64::INFINITY, |feed| feed.depth_below(p));
+    wall.min(above)
+}
+
+fn rough(silo: &Silo) -> Relief {
+    let r = silo.radius;
+    Relief {
+        radius: r,
+        bottom: silo.bottom(),
+        top: silo.top,
+        corrugation: Some(Corrugation { pitch: 0.076, depth: 0.013 }),
+        seams: Some(Seams {
+            spacing: 0.7,
+            uprights: 5,
+            height: 0.003,
+            half_width: 0.03,
+            bolts: 20,
+            bolt_height: 0.008,
+            bolt_radius: 0.02,
+        }),
+        dents: vec![Dent { azimuth: 1.0, z: silo.bottom(), radius: 0.4 * r, height: 0.03 * r }],
+        films: vec![Film { from: 0.3, to: silo.apex() - 0.1, thickness: 0.02 * r, lobes: 3, azimuth: 0.2 }],
+    }
+}
+
+proptest! {
+    #[test]
+    fn a_perfect_silo_is_hit_first_and_exactly(
+        silo in silos(), plan in shapes(), level in 0.0..0.9f64,
+        share in 0.0..0.9f64, azimuth in -3.1..3.1f64, ray in directions(),
+    ) {
+        let feed = Feed::fill(&silo, shape_for(silo.radius, plan), level).ok();
+        let origin = origin_in(&silo, share, azimuth);
+        let world = SiloWorld { silo: silo.clone(), wall: None, feed, clutter: vec![] };
+        prop_assume!(world.check_camera(&origin).is_ok());
+        let Some(hit) = world.cast(&origin, &ray) else {
+            prop_assert!(ray.z < 0.0, "only rays that look up leave the silo");
+            return Ok(());
+        };
+        let at = |t: f64| clearance(&silo, world.feed.as_ref(), &(origin + ray * t));
+        prop_assert!(hit.t > 0.0 && at(hit.t).abs() < 1e-9, "{:?} is {} off", hit, at(hit.t));
+        prop_assert!((1..1000).all(|i| at(hit.t * f64::from(i) / 1000.0) > -1e-9));
+        prop_assert!(hit.normal.dot(&ray) <= 1e-9 && (hit.normal.norm() - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_uneven_wall_is_hit_first_and_exactly(
+        silo in silos(), share in 0.0..0.7f64, azimuth in -3.1..3.1f64, ray in directions(), ovality in 0.0..0.05f64,
+    ) {
+        let Ok(wall) = Wall::new(&silo, rough(&silo), ovality, 0.4) else { return Err(TestCaseError::reject("too rough")) };
+        let origin = origin_in(&silo, share, azimuth);
+        let world = SiloWorld { silo: silo.clone(), wall: Some(wall.clone()), feed: None, clutter: vec![] };
+        prop_assume!(world.check_camera(&origin).is_ok());
+        let radius = |p: &Vec3| {
+            let perfect = silo.radius.min(silo.slope() * (silo.apex() - p.z));
+            let angle = p.y.atan2(p.x);
+            let oval = 1.0 + ovality * (2.0 * (angle - 0.4)).cos();
+            perfect * oval + perfect / silo.radius * wall.relief.jet(angle, p.z, p.z < silo.bottom())[0]
+        };
+        let Some(hit) = world.cast(&origin, &ray) else {
+            prop_assert!(ray.z < 0.0);
+            return Ok(());
+        };
+        let gap = |t: f64| { let p = origin + ray * t; radius(&p) - p.xy().norm() };
+        prop_assert!(gap(hit.t).abs() < 1e-9);
+        prop_assert!((1..2000).all(|i| gap(hit.t * f64::from(i) / 2000.0) > -1e-9));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(16))]
+
+    #[test]
+    fn volume_is_between_nothing_and_the_silo_and_grows_with_the_level(
+        silo in silos(), plan in shapes(), level in 0.0..0.9f64,
+    ) {
+        let shape = shape_for(silo.radius, plan);
+        let fill = |level: f64| Feed::fill(&silo, shape.clone(), level).map(|feed| volume::content(&feed));
+        let (low, high) = (fill(level), fill(level + 0.1));
+        let (Ok(low), Ok(high)) = (low, high) else { return Err(TestCaseError::reject("no feed")) };
+        prop_assert!(low.volume >= 0.0 && high.volume <= silo.capacity() * (1.0 + 1e-9));
+        prop_assert!(low.volume <= high.volume * (1.0 + 1e-9));
+    }
+}
+
+#[test]
+fn the_vertex_itself_is_the_cone() {
+    let silo = Silo {
+        radius: 1.0,
+        cylinder_height: 2.0,
+        cone_height: 1.0,
+        top: 0.0,
+        roof: false,
+        outlet_radius: 0.0,
+        outlet_length: 0.0,
+        outlet_offset: [0.0; 2],
+    };
+    let world = SiloWorld { silo: silo.clone(), wall: None, feed: None, clutter: vec![] };
+    let hit = world.cast(&Vec3::zeros(), &Vec3::z()).map(|hit| (hit.t, hit.label));
+    assert_eq!(hit, Some((3.0, Label::Cone)));
+    let relief = Relief { dents: vec![], films: vec![], seams: None, ..rough(&silo) };
+    let wall = Wall::new(&silo, relief, 0.0, 0.0).ok();
+    let hit = SiloWorld { wall, ..world }.cast(&Vec3::zeros(), &Vec3::z()).map(|hit| (hit.t, hit.label));
+    assert!(matches!(hit, Some((t, Label::Cone)) if (t - 3.0).abs() < 1e-9), "{hit:?}");
+}

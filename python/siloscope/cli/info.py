@@ -1,0 +1,130 @@
+"""``siloscope info``: what is inside a file."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+import siloscope.frames
+from siloscope.cli import options
+from siloscope.cli.outcome import PARTIAL, print_json
+from siloscope.cli.progress import track
+
+
+def info(
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="Recording, image, array, cloud, or folder of them.")],
+    camera: options.CameraFile = None,
+    depth_unit: options.DepthUnit = None,
+    stream: options.Stream = None,
+    check: Annotated[bool, typer.Option("--check", help="Also read every frame and tell which are damaged.")] = False,
+    as_json: options.AsJson = False,
+) -> int:
+    """Show what is inside a file: streams, sizes, units, intrinsics, frames, gravity.
+
+    [bold]Example:[/bold] siloscope info recording.bag
+
+    With --check, exit code 5 tells that some frames are damaged.
+    """
+    with siloscope.frames.open(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
+        read = sum(1 for _ in track(source, "reading")) if check else None
+        document = source.describe() | ({"read": read} if check else {})
+    if as_json:
+        print_json(document)
+    else:
+        print_description(document)
+    return PARTIAL if check and document["problems"] else 0
+
+
+def print_description(document: dict[str, Any]) -> None:
+    """A table on stdout."""
+    from rich.console import Console
+    from rich.table import Table
+
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_column(style="bold")
+    table.add_column(overflow="fold")
+    for key, text in rows(document):
+        table.add_row(key, text)
+    Console(highlight=False, markup=False, soft_wrap=True).print(table)
+
+
+def rows(document: dict[str, Any]) -> list[tuple[str, str]]:
+    """The description as pairs of a name and a text for people."""
+    known = [
+        ("file", f"{document['file']} ({document['format']})"),
+        ("frames", _frames(document)),
+        *((f"stream {'*' if stream.get('chosen') else ' '}", _stream(stream)) for stream in document["streams"]),
+        ("camera", _camera(document)),
+        ("depth unit", _unit(document)),
+        ("gravity", _gravity(document["gravity"])),
+        ("time", _time(document["timestamps"])),
+        *((key.replace("_", " "), _short(value)) for key, value in document["provenance"].items() if key not in _SHOWN),
+        *(("problem", problem) for problem in document["problems"]),
+    ]
+    return [(key, text) for key, text in known if text]
+
+
+_SHOWN = ("format", "file", "camera_from", "depth_unit_from")
+
+
+def _frames(document: dict[str, Any]) -> str:
+    count = "known after reading (--check)" if document["frames"] is None else str(document["frames"])
+    return count if document.get("read") is None else f"{count}, {document['read']} of them readable"
+
+
+def _stream(stream: dict[str, Any]) -> str:
+    size = " x ".join(map(str, stream.get("size") or ())) or "size unknown"
+    what = "points" if len(stream.get("size") or ()) == 1 else "pixels"
+    count = "" if stream.get("frames") is None else f", {stream['frames']} frames"
+    return f"{stream.get('name')}: {stream.get('kind')}, {size} {what}, {stream.get('dtype') or 'type unknown'}{count}"
+
+
+def _camera(document: dict[str, Any]) -> str:
+    camera = document["camera"]
+    if camera is None:
+        depth = any(stream.get("kind") == "depth" and stream.get("chosen") for stream in document["streams"])
+        return "unknown; give --camera" if depth else ""
+    names = ("fx", "fy", "cx", "cy")
+    numbers = " ".join(f"{name} {camera[name]:.3f}".rstrip("0").rstrip(".") for name in names)
+    lens = " ".join([camera["distortion_model"], *(f"{k:.6g}" for k in camera["distortion"])])
+    return f"{camera['width']} x {camera['height']}, {numbers}, distortion {lens}{_origin(document['camera_from'])}"
+
+
+def _unit(document: dict[str, Any]) -> str:
+    unit = document["depth_unit"]
+    raw = [stream for stream in document["streams"] if stream.get("kind") == "depth" and stream.get("chosen")]
+    if unit is not None:
+        return f"{unit * 1000:.6g} mm{_origin(document['depth_unit_from'])}"
+    if any("float" in str(stream.get("dtype")) for stream in raw):
+        return "metres"
+    return "unknown; give --depth-unit" if raw else ""
+
+
+def _gravity(gravity: list[float] | None) -> str:
+    if gravity is None:
+        return ""
+    size = math.sqrt(sum(g * g for g in gravity))
+    return f"{' '.join(f'{g:.3f}' for g in gravity)} m/s² ({size:.2f})"
+
+
+def _time(times: dict[str, float] | None) -> str:
+    if times is None:
+        return ""
+    from datetime import UTC, datetime
+
+    first, last = times["first"], times["last"]
+    if not 1e8 < first < 1e11:  # since the recording's start, not since 1970
+        return f"{first:.3f} to {last:.3f} s ({last - first:.3f} s)"
+    return f"{datetime.fromtimestamp(first, UTC):%Y-%m-%d %H:%M:%S} UTC, {last - first:.3f} s long"
+
+
+def _origin(source: str | None) -> str:
+    return f" ({source})" if source else ""
+
+
+def _short(value: Any) -> str:
+    text = ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
+    return text if len(text) <= 200 else f"{text[:197]}..."
