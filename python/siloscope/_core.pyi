@@ -44,4 +44,11 @@ def surface_fit_image(
     gravity: tuple[float, float, float, float] | None = None,
     labels: bool = True,
 ) -> dict[str, Any]: ...
+def surface_fit_cloud(
+    points: NDArray[np.float64],
+    grid: float,
+    radius: tuple[float, float] | None = None,
+    gravity: tuple[float, float, float, float] | None = None,
+    threads: int = 1,
+) -> dict[str, Any]: ...
 def surface_refusals() -> list[tuple[str, str, str]]: ...

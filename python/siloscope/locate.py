@@ -1,9 +1,9 @@
-"""One frame in, the pose out: every method behind one function."""
+"""`locate`: one frame in, the camera's pose in its silo out."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,160 +13,148 @@ from numpy.typing import ArrayLike, NDArray
 
 from siloscope import sensors, surface
 from siloscope.camera import Camera
-from siloscope.errors import InputError, UsageError
+from siloscope.errors import UsageError
 from siloscope.estimate import Estimate
 from siloscope.frame import Frame
-from siloscope.region import depth_metres
+from siloscope.inputs import Prepared, prepare
 from siloscope.sensors import SensorProfile
 
-
-def locate(
-    frame: Frame | ArrayLike,
-    camera: Camera | None = None,
-    *,
-    method: str = "surface",
-    sensor: str | Path | SensorProfile | None = None,
-    depth_unit: float | None = None,
-    diameter: float | None = None,
-    gravity: ArrayLike | None = None,
-    mask: ArrayLike | None = None,
-    grid: float = 0.05,
-    neighbours: int = 30,
-    threads: int = 1,
-) -> Estimate:
-    """Find the silo's axis in one frame, and so the camera's pose in the silo.
-
-    Parameters
-    ----------
-    frame : Frame, or array
-        A frame as `siloscope.frames` gives it; or depth (H, W), floating point in metres or uint16 in raw units.
-    camera : Camera
-        Intrinsics of a depth array; wins over the frame's own.
-    method : str
-        One of `METHODS`: ``surface`` fits the wall itself.
-    sensor : str, path or SensorProfile, optional
-        The sensor's depth error (`siloscope.sensors.names`); without it bias and noise are estimated with the pose.
-    depth_unit : float, optional
-        Metres per raw unit; required for uint16 depth unless the frame has it.
-    diameter : float, optional
-        Inner diameter of the cylinder by tape, metres: fixes the depth's scale.
-    gravity : (3,), optional
-        Direction of gravity in the camera frame, any length; the frame's own unless given.
-    mask : boolean array of the frame's shape, optional
-        What belongs to the silo; all unless given.
-    grid : float
-        Edge of the voxel grid's cells, metres (step 1).
-    neighbours : int
-        Neighbours k of normals and shape tensors (step 2).
-    threads : int
-        Threads to use.
-
-    Returns
-    -------
-    Estimate
-        With status ``refused`` and a reason where the frame does not show enough wall.
-
-    Raises
-    ------
-    InputError
-        Where the frame can't be used: no camera, a camera of another size, no unit, another shape of mask.
-    UsageError
-        For an unknown method or sensor, or a setting outside its bounds.
-    """
-    if method not in METHODS:
-        raise UsageError(f"unknown method '{method}'; known are {', '.join(METHODS)}")
-    known = _masked(_completed(_as_frame(frame), camera, depth_unit), mask)
-    down = _gravity(known.gravity if gravity is None else gravity)
-    settings = Settings(sensors.load(sensor), diameter, down, grid, neighbours, threads)
-    return METHODS[method](known, settings)
+Number = float | None
 
 
 @dataclass(frozen=True)
 class Settings:
-    """The settings of `locate`, checked."""
+    """What the caller asks for, checked."""
 
     profile: SensorProfile
-    diameter: float | None
+    diameter: Number
     gravity: NDArray[np.float64] | None
-    grid: float
+    grid: Number
     neighbours: int
     threads: int
 
-    def __post_init__(self) -> None:
-        if self.diameter is not None:
-            _check("diameter", self.diameter, 0.001, 200.0, "the cylinder's inner diameter in metres")
-        _check("grid", self.grid, 1e-4, 100.0, "the edge of a cell in metres, such as 0.05")
-        _check("neighbours", self.neighbours, 6, 1000, "a number of points, such as 30")
-        _check("threads", self.threads, 1, 256, "a number of threads")
+
+def locate(
+    data: Frame | ArrayLike,
+    camera: Camera | None = None,
+    *,
+    method: str = "surface",
+    sensor: str | Path | SensorProfile | None = None,
+    depth_unit: Number = None,
+    diameter: Number = None,
+    gravity: ArrayLike | None = None,
+    mask: ArrayLike | None = None,
+    crop: Sequence[float] | None = None,
+    grid: Number = None,
+    neighbours: int = 30,
+    threads: int = 1,
+) -> Estimate:
+    """Find the silo's axis in one frame, and with it the camera's pose (Eqs. 5–7).
+
+    Parameters
+    ----------
+    data : Frame, or array
+        A depth image (H, W), floats in metres or unsigned integers in raw units; or points (N, 3) or (H, W, 3) in the
+        camera frame, metres. 0, NaN, negative depths and raw 65535 are "no measurement".
+    camera : Camera, optional
+        Intrinsics; wins over the frame's own. Without any, the sensor profile's nominal ones for the image's size.
+    method : {"surface", "shape-tensor"}
+        Cylinder and cone fitted to the wall, or the six steps of the paper's section 2.3.
+    sensor : str, path or SensorProfile, optional
+        Profile of the depth error (`siloscope.sensors.names()`); without one it is estimated from the frame.
+    depth_unit : float, optional
+        Metres per raw unit; required for integer depth whose frame does not tell.
+    diameter : float, optional
+        Inner diameter of the silo's cylinder in metres, which fixes the scale of a sensor that is not known.
+    gravity : array (3,), optional
+        Direction of gravity in the camera frame, any length.
+    mask : array of bool, optional
+        True where the silo is, of the frame's shape.
+    crop : (xmin, xmax, ymin, ymax, zmin, zmax), optional
+        Box in the camera frame, metres; only points inside are used.
+    grid : float, optional
+        Side of the voxel grid's cells, m; 0.05 (step 1), or less for small clouds.
+    neighbours : int
+        Neighbours for normals and shape tensors (method ``shape-tensor``).
+    threads : int
+        Threads for what can be shared; the answer does not depend on it.
+
+    Returns
+    -------
+    Estimate
+        With status "refused" and a reason where the frame does not show enough wall for a trustworthy answer.
+
+    Raises
+    ------
+    InputError
+        For a frame that can't be used.
+    UsageError
+        For settings that can't be.
+    """
+    run = METHODS.get(method)
+    if run is None:
+        raise UsageError(f"unknown method '{method}'; known are {', '.join(METHODS)}")
+    profile = sensors.load(sensor)
+    settings = Settings(
+        profile,
+        _bounded("diameter", diameter, 0.01, 200.0),
+        _direction(gravity),
+        _bounded("grid", grid, 1e-4, 10.0),
+        int(_whole("neighbours", neighbours, 6, 500)),
+        int(_whole("threads", threads, 1, 256)),
+    )
+    prepared = prepare(data, camera, profile, depth_unit=depth_unit, mask=mask, crop=crop)
+    if settings.gravity is None and prepared.gravity is not None:
+        settings = replace(settings, gravity=_direction(prepared.gravity))
+    return run(prepared, settings, _config(method, prepared, settings))
 
 
-def _check(name: str, value: float, low: float, high: float, remedy: str) -> None:
-    if not (math.isfinite(value) and low <= value <= high):
-        raise UsageError(f"{name} {value} is not between {low:g} and {high:g}; give {remedy}")
+def _surface(prepared: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:
+    known: dict[str, Any] = {"diameter": settings.diameter, "gravity": settings.gravity, "config": config}
+    if prepared.points is not None:
+        return surface.fit_points(prepared.points, grid=settings.grid, threads=settings.threads, **known)
+    assert prepared.depth is not None
+    assert prepared.camera is not None
+    return surface.fit_depth(prepared.depth, prepared.camera, settings.profile, **known)
 
 
-def _as_frame(frame: Frame | ArrayLike) -> Frame:
-    if isinstance(frame, Frame):
-        return frame
-    values = np.asarray(frame)
-    if values.ndim != 2 or values.dtype.kind not in "fu":
-        raise InputError(
-            f"depth of shape {values.shape} and type {values.dtype} can't be used; give (H, W) floating-point metres "
-            "or uint16 raw units"
-        )
-    return Frame(depth=values)
+METHODS: dict[str, Callable[[Prepared, Settings, dict[str, Any]], Estimate]] = {"surface": _surface}
+"""The methods by name."""
 
 
-def _completed(frame: Frame, camera: Camera | None, depth_unit: float | None) -> Frame:
-    """The frame with what the caller says, checked."""
-    frame = replace(frame, camera=camera or frame.camera, depth_unit=depth_unit or frame.depth_unit)
-    if frame.depth is None:
-        return frame
-    if frame.camera is None:
-        raise InputError(f"{frame.source}: a depth image needs its camera; give the intrinsics with --camera FILE")
-    height, width = frame.depth.shape
-    if (frame.camera.width, frame.camera.height) != (width, height):
-        raise InputError(
-            f"{frame.source}: the frame is {width} x {height} pixels but the camera {frame.camera.width} x "
-            f"{frame.camera.height}; give the camera of this stream"
-        )
-    if frame.depth.dtype.kind == "u" and frame.depth_unit is None:
-        raise InputError(f"{frame.source}: raw depth needs its unit; give depth_unit in metres, such as 0.001")
-    if not np.isfinite(frame.camera.rays()).any():
-        raise InputError(f"{frame.source}: the camera's distortion can't be undone; check its coefficients")
-    return frame
+def _config(method: str, prepared: Prepared, settings: Settings) -> dict[str, Any]:
+    """The effective settings, written beside every result."""
+    return {
+        "method": method,
+        "sensor": settings.profile.to_dict(),
+        "diameter": settings.diameter,
+        "gravity": None if settings.gravity is None else settings.gravity.tolist(),
+        "grid": settings.grid,
+        "neighbours": settings.neighbours,
+        "threads": settings.threads,
+        "camera": None if prepared.camera is None else prepared.camera.to_dict(),
+        **prepared.config,
+    }
 
 
-def _masked(frame: Frame, mask: ArrayLike | None) -> Frame:
-    if frame.depth is None:
-        return frame
-    chosen = np.ones(frame.depth.shape, np.bool_) if mask is None else np.asarray(mask, np.bool_)
-    if chosen.shape != frame.depth.shape:
-        raise InputError(f"{frame.source}: the mask has the shape {chosen.shape}, the frame {frame.depth.shape}")
-    masked = replace(frame, depth=np.where(chosen, frame.depth, frame.depth.dtype.type(0)))
-    if not np.isfinite(depth_metres(masked)).any():
-        raise InputError(f"{frame.source}: no pixel has a depth; check the stream, the mask, and what the sensor saw")
-    return masked
+def _bounded(name: str, value: Number, least: float, most: float) -> Number:
+    if value is None:
+        return None
+    if isinstance(value, bool) or not math.isfinite(value) or not least <= value <= most:
+        raise UsageError(f"{name} must be between {least:g} and {most:g} m, got {value}")
+    return float(value)
 
 
-def _gravity(gravity: ArrayLike | None) -> NDArray[np.float64] | None:
+def _whole(name: str, value: float, least: int, most: int) -> float:
+    if isinstance(value, bool) or value != int(value) or not least <= value <= most:
+        raise UsageError(f"{name} must be a whole number between {least} and {most}, got {value}")
+    return value
+
+
+def _direction(gravity: ArrayLike | None) -> NDArray[np.float64] | None:
     if gravity is None:
         return None
-    down = np.asarray(gravity, np.float64)
-    if down.shape != (3,) or not np.isfinite(down).all() or not np.any(down):
-        raise UsageError(f"gravity {gravity} is no direction; give x, y, z in the camera frame")
-    return down
-
-
-def _surface(frame: Frame, settings: Settings) -> Estimate:
-    if frame.depth is None or frame.camera is None:
-        raise InputError(f"{frame.source}: method surface reads depth images; convert the cloud or use another method")
-    depth = np.ascontiguousarray(depth_metres(frame), np.float32)
-    config: dict[str, Any] = {"sensor": settings.profile.to_dict(), "diameter": settings.diameter}
-    return surface.fit_depth(
-        depth, frame.camera, settings.profile, diameter=settings.diameter, gravity=settings.gravity, config=config
-    )
-
-
-METHODS: dict[str, Callable[..., Estimate]] = {"surface": _surface}
-"""Methods by name."""
+    vector = np.asarray(gravity, np.float64)
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not np.linalg.norm(vector) > 0:
+        raise UsageError(f"gravity must be three numbers, not all zero, got {gravity}")
+    return vector

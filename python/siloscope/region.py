@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from siloscope.errors import InputError, UsageError
 from siloscope.frame import Frame
+from siloscope.inputs import metres
 
 Mask = NDArray[np.bool_]
 
@@ -21,13 +22,9 @@ LARGEST_MASK = 100_000_000
 
 def depth_metres(frame: Frame) -> NDArray[np.float64]:
     """Depth (H, W) of an image frame in metres, NaN where there is no measurement."""
-    assert frame.depth is not None
-    depth = frame.depth
-    raw = np.issubdtype(depth.dtype, np.integer)
-    metres = depth * (frame.depth_unit or 1.0) if raw else depth.astype(np.float64)
-    seen = (depth > 0) & (depth < 65535) if raw else np.isfinite(depth) & (depth > 0)
-    known: NDArray[np.float64] = np.where(seen, metres, np.nan)
-    return known
+    depth = metres(frame).astype(np.float64)
+    depth[depth == 0] = np.nan
+    return depth
 
 
 def frame_points(frame: Frame) -> NDArray[np.float64]:

@@ -95,14 +95,67 @@ def fit_depth(
     config : dict, optional
         Effective settings to record in the estimate.
     """
-    radius = None if diameter is None else (diameter / 2.0, diameter_std / 2.0)
-    pull = None
-    if gravity is not None:
-        pull = (float(gravity[0]), float(gravity[1]), float(gravity[2]), gravity_std)
+    radius, pull = _priors(diameter, diameter_std, gravity, gravity_std)
     found = _core.surface_fit_image(depth, camera.rays(), profile.bias, profile.bias_std, profile.noise, radius, pull)
     if "refusal" in found:
         return refused("surface", found["refusal"], config or {})
     return _estimate(found, profile, config or {}, diameter, gravity)
+
+
+def fit_points(
+    points: NDArray[np.float64],
+    *,
+    grid: float | None = None,
+    diameter: float | None = None,
+    diameter_std: float = DIAMETER_STD,
+    gravity: NDArray[np.float64] | None = None,
+    gravity_std: float = GRAVITY_STD,
+    threads: int = 1,
+    config: dict[str, Any] | None = None,
+) -> Estimate:
+    """Fit the wall to a cloud, seen from inside or outside.
+
+    Parameters
+    ----------
+    points : float64 (N, 3)
+        Points in the camera frame, metres; rows that aren't finite are left out. They are taken as they are: without
+        rays, no depth bias can be told from them.
+    grid : float, optional
+        Side of the voxel grid's cells in metres; None for `cell_size`.
+
+    The rest is as for `fit_depth`.
+    """
+    radius, pull = _priors(diameter, diameter_std, gravity, gravity_std)
+    found = _core.surface_fit_cloud(points, grid or cell_size(points), radius, pull, threads)
+    if "refusal" in found:
+        return refused("surface", found["refusal"], config or {})
+    return _estimate(found, SensorProfile("none: a cloud is taken as it is"), config or {}, diameter, gravity)
+
+
+def cell_size(points: NDArray[np.float64]) -> float:
+    """Side of voxel cells for a cloud: the paper's 0.05 m, or a 60th of the cloud where it is small, in metres."""
+    finite = points[np.isfinite(points).all(axis=1)]
+    if len(finite) == 0:
+        return GRID
+    extent = float(np.max(np.percentile(finite, 95, axis=0) - np.percentile(finite, 5, axis=0)))
+    return min(GRID, extent / 60.0) if extent > 0.0 else GRID
+
+
+GRID = 0.05
+"""Side of the voxel grid's cells, m (step 1 of section 2.3)."""
+
+Prior = tuple[float, float] | None
+Pull = tuple[float, float, float, float] | None
+
+
+def _priors(
+    diameter: float | None, diameter_std: float, gravity: NDArray[np.float64] | None, gravity_std: float
+) -> tuple[Prior, Pull]:
+    """Radius and gravity with their standard deviations, as the core takes them."""
+    radius = None if diameter is None else (diameter / 2.0, diameter_std / 2.0)
+    if gravity is None:
+        return radius, None
+    return radius, (float(gravity[0]), float(gravity[1]), float(gravity[2]), gravity_std)
 
 
 def refused(method: str, slug: str, config: dict[str, Any]) -> Estimate:
@@ -137,13 +190,13 @@ def _estimate(
         covariance=covariance[:4, :4].copy(),
         silo=silo,
         silo_std=silo_std,
-        pixel_ratios=_ratios(found["pixel_counts"]),
-        area_ratios=_ratios(found["areas"]),
+        pixel_ratios=_ratios(found.get("pixel_counts")),
+        area_ratios=_ratios(found.get("areas")),
         config=config,
         timing_ms={name.replace(" ", "_"): ms for name, ms in found["timing"]},
         extra=extra,
         evidence=_evidence(found, profile, diameter, gravity),
-        details=SurfaceDetails(found["points"], found["residuals"], found["labels"]),
+        details=SurfaceDetails(found["points"], found["residuals"], found.get("labels")),
     )
 
 
@@ -164,8 +217,8 @@ def geometry(
 
 
 def _ratios(counts: Any) -> Ratios | None:
-    """Shares of cylinder, cone and feed among everything seen."""
-    seen = sum(counts[1:])
+    """Shares of cylinder, cone and feed among everything seen; None for clouds, whose points are no pixels."""
+    seen = 0.0 if counts is None else sum(counts[1:])
     return Ratios(*(counts[k] / seen for k in (1, 2, 3))) if seen > 0 else None
 
 

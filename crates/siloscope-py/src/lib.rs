@@ -6,6 +6,7 @@ mod camera;
 mod convert;
 mod files;
 mod scene;
+mod steps;
 mod surface;
 
 /// The compiled core of siloscope.
@@ -16,5 +17,6 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     files::register(m)?;
     scene::register(m)?;
     surface::register(m)?;
+    steps::register(m)?;
     Ok(())
 }

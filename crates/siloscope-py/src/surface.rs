@@ -5,13 +5,14 @@ use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArra
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use siloscope::Vec3;
-use siloscope::fit::{Knowledge, SurfaceFit, fit_image};
+use siloscope::fit::{Knowledge, Outcome, SurfaceFit, fit_cloud, fit_image};
 use siloscope::labels::{Labels, label_pixels};
 use siloscope::patches::DepthImage;
 use siloscope::refusal::Refusal;
 use siloscope::sensor::{DepthBias, DepthError, NoiseLaw};
 use siloscope::share::FrameShare;
 use siloscope::surface::PARAMETERS;
+use siloscope::workers::Workers;
 
 /// Bias and noise as plain numbers: offset, scale, quadratic; floor, constant, linear, quadratic, factor, power.
 type Bias = (f64, f64, f64);
@@ -65,16 +66,43 @@ fn surface_fit_image<'py>(
     let found = py.detach(|| {
         let found = fit_image(&image, &know);
         let labels = found.as_ref().ok().filter(|_| labels).map(|fit| label_pixels(&image, fit));
-        found.map(|fit| (fit, labels))
+        (found, labels)
     });
+    let out = outcome(py, found.0)?;
+    if let Some(labels) = found.1 {
+        add_labels(py, &out, labels, (height, width))?;
+    }
+    Ok(out)
+}
+
+/// Fits the wall to a cloud: float64 points (N, 3) in metres; rows that aren't finite are left out.
+#[pyfunction]
+#[pyo3(signature = (points, grid, radius=None, gravity=None, threads=1))]
+fn surface_fit_cloud<'py>(
+    py: Python<'py>,
+    points: PyReadonlyArray2<'py, f64>,
+    grid: f64,
+    radius: Option<(f64, f64)>,
+    gravity: Option<(f64, f64, f64, f64)>,
+    threads: usize,
+) -> PyResult<Bound<'py, PyDict>> {
+    let points = points.as_array();
+    if points.shape()[1] != 3 {
+        return Err(value_error(format!("points have shape {:?}, expected (N, 3)", points.shape())));
+    }
+    let points: Vec<Vec3> = points.rows().into_iter().map(|p| Vec3::new(p[0], p[1], p[2])).collect();
+    let know = Knowledge {
+        error: DepthError::unknown(),
+        radius,
+        gravity: gravity.map(|(x, y, z, std)| (Vec3::new(x, y, z), std)),
+    };
+    let found = py.detach(|| fit_cloud(&points, grid, &Workers::new(threads), &know)).map_err(value_error)?;
+    outcome(py, found)
+}
+
+fn outcome(py: Python<'_>, found: Outcome) -> PyResult<Bound<'_, PyDict>> {
     match found {
-        Ok((fit, labels)) => {
-            let out = result(py, &fit)?;
-            if let Some(labels) = labels {
-                add_labels(py, &out, labels, (height, width))?;
-            }
-            Ok(out)
-        }
+        Ok(fit) => result(py, &fit),
         Err(refusal) => {
             let out = PyDict::new(py);
             out.set_item("refusal", refusal.slug())?;
@@ -147,5 +175,6 @@ fn surface_refusals() -> Vec<(&'static str, &'static str, &'static str)> {
 
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(surface_fit_image, m)?)?;
+    m.add_function(wrap_pyfunction!(surface_fit_cloud, m)?)?;
     m.add_function(wrap_pyfunction!(surface_refusals, m)?)
 }

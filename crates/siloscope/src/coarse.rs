@@ -4,7 +4,7 @@ use crate::patches::{NONE, Patches};
 use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, NoiseLaw};
-use crate::start::{Oriented, Start, other_part, starts};
+use crate::start::{Oriented, Start, View, other_part, starts};
 use crate::surface::PlacedSurface;
 use crate::verdict::{WallEvidence, wall_evidence};
 
@@ -22,9 +22,13 @@ pub fn coarse_fit(
     pixel: f64,
 ) -> Result<(Fit, WallEvidence), Refusal> {
     let free_size = Prior { radius: prior.radius.filter(|_| prior.bias_std[1] == 0.0), ..prior.clone() };
-    let from_inside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, true);
+    if patches.cloud {
+        let found = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Unknown);
+        return best_settled(patches, noise, (&free_size, pixel), found);
+    }
+    let from_inside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Inside);
     best_settled(patches, noise, (&free_size, pixel), from_inside).or_else(|refusal| {
-        let from_outside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, false);
+        let from_outside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Outside);
         best_settled(patches, noise, (&free_size, pixel), from_outside).map_err(|_| refusal)
     })
 }
@@ -53,19 +57,19 @@ fn best_settled(
 }
 
 /// Start values after a few steps, each with its likelihood.
-fn candidates(problem: &Problem, inside: bool) -> Vec<(f64, Fit)> {
+fn candidates(problem: &Problem, view: View) -> Vec<(f64, Fit)> {
     let refined = |start: Start| {
         let mut fit = Fit {
             surface: start.surface,
             bias: problem.prior.bias,
             inside: start.inside,
-            misfit: 0.03 * start.surface.radius.unwrap_or(1.0),
+            misfit: 0.03 * start.surface.size(),
             weights: vec![0.0; problem.patches.list.len()],
         };
         problem.refine(&mut fit, 5, 6, 0.25);
         (likelihood(problem, &fit), fit)
     };
-    starts(&oriented(problem, &problem.prior.bias), inside).into_iter().take(5).map(refined).collect()
+    starts(&oriented(problem, &problem.prior.bias), view).into_iter().take(5).map(refined).collect()
 }
 
 /// Refines a candidate on more patches and holds it against the evidence.
@@ -110,7 +114,7 @@ fn judge(e: &WallEvidence, inside: bool) -> Result<(), Refusal> {
 fn with_other_part(problem: &Problem, fit: Fit) -> Fit {
     let before = likelihood(problem, &fit);
     let Some(surface) = other_part(&fit.surface, &oriented(problem, &fit.bias)) else { return fit };
-    let mut both = Fit { surface, misfit: 0.01 * surface.radius.unwrap_or(1.0), ..fit.clone() };
+    let mut both = Fit { surface, misfit: 0.01 * surface.size(), ..fit.clone() };
     problem.refine(&mut both, 4, 3, 0.2);
     if likelihood(problem, &both) > before { both } else { fit }
 }
@@ -123,6 +127,7 @@ fn oriented(problem: &Problem, bias: &DepthBias) -> Vec<Oriented> {
             Oriented {
                 p: p.at(d),
                 n: p.normal,
+                signed: !problem.patches.cloud,
                 angle: 0.2 + 3.0 * p.sigma_normal,
                 slack: 2.0 * p.scatter / p.count.sqrt(),
             }

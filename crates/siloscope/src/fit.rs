@@ -1,16 +1,19 @@
 //! The surface fit: a depth frame in, the silo's wall as cylinder and cone out, with its covariance.
 
+use crate::Result;
 use crate::Vec3;
+use crate::cloud::cloud_patches;
 use crate::coarse::{coarse_fit, wall_patches};
 use crate::covariance::{scale_uncertainty, widened};
-use crate::patches::{DepthImage, Patches, noise_from_scatter, tile_patches};
-use crate::polish::{TileEquation, moved, pixel_equations, polish, solve_equations};
+use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
+use crate::polish::{TileEquation, moved, patch_equations, pixel_equations, polish, solve_equations};
 use crate::refine::{Equation, Fit, Prior, Problem, tukey};
 use crate::refusal::Refusal;
-use crate::sensor::{DepthError, NoiseLaw};
+use crate::sensor::{DepthBias, DepthError, NoiseLaw};
 use crate::share::FrameShare;
-use crate::surface::{Information, PARAMETERS};
+use crate::surface::{Information, PARAMETERS, Parameters, PlacedSurface};
 use crate::verdict::WallEvidence;
+use crate::workers::Workers;
 
 /// What the caller knows.
 #[derive(Debug, Clone)]
@@ -52,7 +55,7 @@ pub struct SurfaceFit {
 const POLISH_STRIDE: usize = 4;
 
 /// Fits the wall to a depth image.
-pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Result<SurfaceFit, Refusal> {
+pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     let mut clock = Clock::start();
     let mut patches = tile_patches(image, know.error.noise.as_ref());
     if patches.list.len() < 30 {
@@ -77,7 +80,7 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Result<SurfaceFit, Ref
     clock.lap("covariance");
     result.timing = clock.laps;
     result.patches = patches;
-    if result.is_determined(prior.bias_std[1]) { Ok(result) } else { Err(Refusal::PoorlyDetermined) }
+    Ok(result)
 }
 
 /// Largest standard deviation of the axis' direction that still is an answer, radians.
@@ -95,16 +98,48 @@ impl SurfaceFit {
         self.patches.list.iter().map(to_silo).collect()
     }
 
-    /// Whether the pose is known well enough, apart from an unknown scale.
-    fn is_determined(&self, scale_std: f64) -> bool {
-        let surface = &self.fit.surface;
-        let size = surface.radius.or(surface.cone.map(|c| c.slope * c.apex)).unwrap_or(0.0);
-        let variance = |k: usize| self.covariance[(k, k)];
-        let scale = |t: f64| if self.free[8] { 0.0 } else { (t * scale_std).powi(2) };
-        let direction = (variance(0) + variance(1)).sqrt();
-        let position = (variance(2) - scale(surface.pose.t_x) + variance(3) - scale(surface.pose.t_y)).max(0.0).sqrt();
-        direction < MAX_DIRECTION_STD && position < MAX_POSITION_STD * size
+    /// Whether most of the wall's normals, turned towards the origin, point to the axis.
+    fn is_seen_from_inside(&self) -> bool {
+        let placed = PlacedSurface::new(self.fit.surface);
+        let wall = self.residuals.iter().zip(&self.patches.list).filter(|(r, _)| r.is_finite());
+        let inwards = |p: &Patch| placed.turn(&p.normal).dot(&placed.local(&p.origin).gradient) < 0.0;
+        let votes: i64 = wall.map(|(_, p)| if inwards(p) { 1 } else { -1 }).sum();
+        votes > 0
     }
+}
+
+/// A fit, or why there is none.
+pub type Outcome = std::result::Result<SurfaceFit, Refusal>;
+
+/// Fits the wall to a cloud of points in the camera's frame, thinned by a voxel grid with cells of `grid` metres.
+///
+/// A cloud may be seen from inside or outside, and its origin need not be a camera: residuals are distances from the
+/// wall, weighed by each patch's own scatter, and normals have no sign.
+pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge) -> Result<Outcome> {
+    let mut clock = Clock::start();
+    let mut patches = cloud_patches(points, grid, workers)?;
+    if patches.list.len() < 30 {
+        return Ok(Err(Refusal::NoDepth));
+    }
+    clock.lap("patches");
+    let exact = DepthError { bias: DepthBias::default(), bias_std: [0.0; 3], noise: None };
+    let prior = prior(&Knowledge { error: exact, ..know.clone() });
+    let noise = NoiseLaw::uniform(1e-3); // not used: patches of a cloud carry their own scatter
+    let (fit, evidence) = match coarse_fit(&mut patches, noise, &prior, 0.0) {
+        Ok(found) => found,
+        Err(refusal) => return Ok(Err(refusal)),
+    };
+    clock.lap("coarse fit");
+    let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
+    let equations = patch_equations(&problem, &fit, &wall_patches(&problem, &fit));
+    let Some(mut result) = finish(&problem, fit, &equations, evidence) else {
+        return Ok(Err(Refusal::PoorlyDetermined));
+    };
+    clock.lap("covariance");
+    result.timing = clock.laps;
+    result.patches = patches;
+    result.fit.inside = result.is_seen_from_inside();
+    Ok(Ok(result))
 }
 
 fn noise(patches: &Patches, know: &Knowledge) -> NoiseLaw {
@@ -127,6 +162,15 @@ fn prior(know: &Knowledge) -> Prior {
     Prior { bias: know.error.bias, bias_std, radius: know.radius, gravity: know.gravity }
 }
 
+/// Whether the axis is known well enough: its direction, and its position in the middle of the wall that was seen.
+fn is_determined(covariance: &Information, placed: &PlacedSurface, height: f64) -> bool {
+    let [x, y] = placed.axis_shift(height);
+    let variance = |row: &Parameters| row.dot(&(covariance * row));
+    let direction = (covariance[(0, 0)] + covariance[(1, 1)]).sqrt();
+    let position = (variance(&x) + variance(&y)).sqrt();
+    direction < MAX_DIRECTION_STD && position < MAX_POSITION_STD * placed.surface.size()
+}
+
 /// Last solution, covariance and residuals.
 fn finish(problem: &Problem, mut fit: Fit, tiles: &[TileEquation], evidence: WallEvidence) -> Option<SurfaceFit> {
     let (system, total) = solve_equations(problem, &mut fit, tiles)?;
@@ -134,6 +178,11 @@ fn finish(problem: &Problem, mut fit: Fit, tiles: &[TileEquation], evidence: Wal
         tiles.iter().map(|t| (t.patch, moved(&t.equation, &total, fit.misfit))).collect();
     let (model, free) = system.covariance(&fit)?;
     let mut covariance = widened(problem, &model, &system, &equations);
+    let heights = equations.iter().map(|(_, e)| e.z).sum::<f64>();
+    let placed = PlacedSurface::new(fit.surface);
+    if !is_determined(&covariance, &placed, heights / equations.len().max(1) as f64) {
+        return None;
+    }
     let share = FrameShare::new((&system, &covariance), (&equations, fit.misfit), &free);
     if !free[8] {
         covariance += scale_uncertainty(&fit, problem.prior.bias_std[1]);

@@ -4,13 +4,22 @@
 //! angles radians. The camera frame is optical (x right, y down, z forward); the silo frame has its origin on the
 //! axis at the camera's height and z along gravity.
 
+pub mod axis;
+pub mod backproject;
 pub mod camera;
+pub mod candidates;
+pub mod cloud;
 pub mod coarse;
 pub mod covariance;
+pub mod eigen;
 pub mod error;
 pub mod fit;
+pub mod grid;
 pub mod labels;
+pub mod locate;
 pub mod nearest;
+pub mod neighbours;
+pub mod normals;
 pub mod patches;
 pub mod pixels;
 pub mod polish;
@@ -18,10 +27,12 @@ pub mod pose;
 pub mod refine;
 pub mod refusal;
 pub mod sensor;
+pub mod shape_tensor;
 pub mod share;
 pub mod start;
 pub mod surface;
 pub mod verdict;
+pub mod workers;
 
 pub use camera::{Camera, Distortion};
 pub use error::{Error, Result};

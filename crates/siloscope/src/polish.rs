@@ -60,6 +60,34 @@ pub fn pixel_equations(
     (0..wall.len()).filter(|&i| wall[i]).filter_map(tile).collect()
 }
 
+/// Equations of a cloud's wall patches from their own means.
+pub fn patch_equations(problem: &Problem, fit: &Fit, wall: &[bool]) -> Vec<TileEquation> {
+    let placed = PlacedSurface::new(fit.surface);
+    let patch = |patch: usize| {
+        let equation = problem.equation(fit, &placed, patch)?;
+        let seen = &problem.patches.list[patch];
+        let noise = seen.scatter * seen.scatter / seen.count;
+        Some(TileEquation { patch, equation: Equation { variance: noise, ..equation }, scatter: seen.scatter })
+    };
+    let mut equations: Vec<TileEquation> = (0..wall.len()).filter(|&i| wall[i]).filter_map(patch).collect();
+    let factor = noise_factor(&equations);
+    equations.iter_mut().for_each(|e| e.equation.variance *= factor);
+    equations
+}
+
+/// What the residuals' variance is of the stated one: a neighbourhood's scatter also holds the wall's own curvature.
+fn noise_factor(equations: &[TileEquation]) -> f64 {
+    const MEDIAN_OF_CHI_SQUARE: f64 = 0.455;
+    let mut squares: Vec<f64> =
+        equations.iter().map(|e| e.equation.residual.powi(2) / e.equation.variance.max(1e-18)).collect();
+    if squares.is_empty() {
+        return 1.0;
+    }
+    let middle = squares.len() / 2;
+    let (_, &mut median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
+    (median / MEDIAN_OF_CHI_SQUARE).clamp(1e-3, 1.0)
+}
+
 /// Robust solution of linear equations: reweighted a few times, the misfit re-estimated on the way.
 pub fn solve_equations(problem: &Problem, fit: &mut Fit, equations: &[TileEquation]) -> Option<(System, Parameters)> {
     let mut total = Parameters::zeros();

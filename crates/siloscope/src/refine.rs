@@ -111,14 +111,14 @@ impl Problem<'_> {
         }
         let sigma = if cloud { patch.scatter } else { self.noise.sigma(d) };
         let misfit = fit.misfit / cosine;
-        let side = if fit.inside { -1.0 } else { 1.0 };
-        let normal = placed.turn(&patch.normal);
+        let facing = placed.turn(&patch.normal).dot(&at.gradient) / length;
+        let agreement = if cloud { facing.abs() } else { facing * if fit.inside { -1.0 } else { 1.0 } };
         Some(Equation {
             residual: slope * at.value / along,
             jacobian,
             variance: sigma * sigma / patch.count + misfit * misfit,
             cosine: cosine.abs(),
-            angle2: 2.0 * (1.0 - side * normal.dot(&at.gradient) / length),
+            angle2: 2.0 * (1.0 - agreement),
             part: at.part,
             z: at.p.z,
         })

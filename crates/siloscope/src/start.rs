@@ -16,10 +16,28 @@ pub struct Oriented {
     pub p: Vec3,
     /// Unit normal towards the camera.
     pub n: Vec3,
+    /// Whether the normal's sign is known.
+    pub signed: bool,
     /// Tolerated angle between the normal and a model's, radians.
     pub angle: f64,
     /// Tolerated distance of the point from a model that adds to the model's own, metres.
     pub slack: f64,
+}
+
+impl Oriented {
+    /// The cosine of an angle with the normal, or with the line along it where its sign is unknown.
+    #[inline]
+    fn cosine(&self, cosine: f64) -> f64 {
+        if self.signed { cosine } else { cosine.abs() }
+    }
+
+    /// Distance from the z-axis, and the normal's radial and axial parts with the radial one turned inwards if unsigned.
+    fn meridian(&self) -> (f64, f64, f64) {
+        let rho = self.p.x.hypot(self.p.y).max(1e-9);
+        let n_rho = (self.n.x * self.p.x + self.n.y * self.p.y) / rho;
+        let turn = if !self.signed && n_rho > 0.0 { -1.0 } else { 1.0 };
+        (rho, turn * n_rho, turn * self.n.z)
+    }
 }
 
 /// A start value with its score, the soft number of patches that agree.
@@ -48,12 +66,6 @@ struct Hypothesis {
     score: f64,
 }
 
-impl Hypothesis {
-    fn is_inside(&self) -> bool {
-        !matches!(self.shape, Shape::Cylinder { inside: false, .. })
-    }
-}
-
 /// Deterministic random numbers (SplitMix64): the same frame gives the same answer.
 struct Random(u64);
 
@@ -75,8 +87,19 @@ const REACH: f64 = 0.04;
 /// The same once the axis has been refined.
 const FINE_REACH: f64 = 0.015;
 
-/// The best few distinct start values with the camera inside the silo, or outside a cylinder; best first.
-pub fn starts(patches: &[Oriented], from_inside: bool) -> Vec<Start> {
+/// From where the wall may be seen.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum View {
+    /// The camera is inside.
+    Inside,
+    /// The camera is outside a cylinder.
+    Outside,
+    /// Unknown: the points' origin need not be a camera, so normals have no sure sign.
+    Unknown,
+}
+
+/// The best few distinct start values, best first.
+pub fn starts(patches: &[Oriented], view: View) -> Vec<Start> {
     if patches.len() < 8 {
         return Vec::new();
     }
@@ -90,8 +113,8 @@ pub fn starts(patches: &[Oriented], from_inside: bool) -> Vec<Start> {
     let mut kept: Vec<Hypothesis> = Vec::new();
     for trial in 0..TRIALS {
         let mut pick = || &patches[random.below(patches.len())];
-        let found = if trial % 5 < 2 || !from_inside {
-            cylinder(pick(), pick()).filter(|h| h.is_inside() == from_inside)
+        let found = if trial % 5 < 2 || view == View::Outside {
+            cylinder(pick(), pick(), view)
         } else {
             cone(pick(), pick(), pick())
         };
@@ -153,7 +176,7 @@ fn keep(kept: &mut Vec<Hypothesis>, new: Hypothesis) {
     kept.truncate(KEPT);
 }
 
-fn cylinder(i: &Oriented, j: &Oriented) -> Option<Hypothesis> {
+fn cylinder(i: &Oriented, j: &Oriented, view: View) -> Option<Hypothesis> {
     let cross = i.n.cross(&j.n);
     let sine = cross.norm();
     if sine < 0.17 {
@@ -163,10 +186,15 @@ fn cylinder(i: &Oriented, j: &Oriented) -> Option<Hypothesis> {
     let between = j.p - i.p;
     let signed_sine = i.n.cross(&j.n).dot(&x);
     let (li, lj) = (between.cross(&j.n).dot(&x) / signed_sine, between.cross(&i.n).dot(&x) / signed_sine);
-    if li * lj <= 0.0 || (li - lj).abs() > 0.2 * li.abs().min(lj.abs()) {
+    let seen = match view {
+        View::Inside => li > 0.0 && lj > 0.0,
+        View::Outside => li < 0.0 && lj < 0.0,
+        View::Unknown => true,
+    };
+    if !seen || (li.abs() - lj.abs()).abs() > 0.2 * li.abs().min(lj.abs()) {
         return None;
     }
-    let radius = (li + lj).abs() / 2.0;
+    let radius = (li.abs() + lj.abs()) / 2.0;
     let mean = (i.p + i.n * li + j.p + j.n * lj) / 2.0;
     Some(Hypothesis { x, a: mean - x * mean.dot(&x), shape: Shape::Cylinder { radius, inside: li > 0.0 }, score: 0.0 })
 }
@@ -214,7 +242,7 @@ fn agreement(h: &Hypothesis, o: &Oriented) -> f64 {
             ((rho + slope * z) * c, (radial / rho + h.x * slope) * -c, rho)
         }
     };
-    soft(distance, REACH * scale + o.slack, o.n.dot(&expected), o.angle)
+    soft(distance, REACH * scale + o.slack, o.cosine(o.n.dot(&expected)), o.angle)
 }
 
 /// 1 where distance and normal agree, falling to 0 at their tolerances.
@@ -270,17 +298,17 @@ fn profile_score(s: &SiloSurface, inside: bool, reach: f64, local: &[Oriented]) 
 }
 
 fn profile_agreement(s: &SiloSurface, inside: bool, reach: f64, o: &Oriented) -> f64 {
-    let rho = o.p.x.hypot(o.p.y).max(1e-9);
-    let n_rho = (o.n.x * o.p.x + o.n.y * o.p.y) / rho;
+    let (rho, n_rho, n_z) = o.meridian();
     let side = if inside { -1.0 } else { 1.0 };
     match (s.radius, s.cone) {
         (Some(radius), cone) if cone.is_none() || o.p.z < s.cylinder_bottom() => {
-            soft(rho - radius, reach * radius + o.slack, side * n_rho, o.angle)
+            soft(rho - radius, reach * radius + o.slack, o.cosine(side * n_rho), o.angle)
         }
         (_, Some(cone)) => {
             let c = 1.0 / (1.0 + cone.slope * cone.slope).sqrt();
             let distance = (rho - cone.slope * (cone.apex - o.p.z)) * c;
-            soft(distance, reach * rho + o.slack, -c * (n_rho + cone.slope * o.n.z), o.angle)
+            let cosine = o.cosine(-c * (n_rho + cone.slope * n_z));
+            soft(distance, reach * rho + o.slack, cosine, o.angle)
         }
         _ => 0.0,
     }
@@ -290,11 +318,10 @@ fn profile_agreement(s: &SiloSurface, inside: bool, reach: f64, o: &Oriented) ->
 fn best_cone(cylinder: &SiloSurface, reach: f64, local: &[Oriented]) -> Option<SiloSurface> {
     let radius = cylinder.radius?;
     let proposals = local.iter().filter_map(|o| {
-        let rho = o.p.x.hypot(o.p.y).max(1e-9);
-        let n_rho = (o.n.x * o.p.x + o.n.y * o.p.y) / rho;
-        let slope = o.n.z / n_rho;
+        let (rho, n_rho, n_z) = o.meridian();
+        let slope = n_z / n_rho;
         let cone = Cone { slope, apex: o.p.z + rho / slope };
-        let meridian = n_rho.hypot(o.n.z) > 0.97;
+        let meridian = n_rho.hypot(n_z) > 0.97;
         let possible = n_rho < 0.0 && (0.1..2.7).contains(&slope) && rho < 0.97 * radius && meridian;
         possible.then_some(SiloSurface { cone: Some(cone), ..*cylinder })
     });
@@ -304,8 +331,7 @@ fn best_cone(cylinder: &SiloSurface, reach: f64, local: &[Oriented]) -> Option<S
 /// Above a known cone, the cylinder that most patches agree with; each patch proposes its own radius.
 fn best_cylinder(cone: &SiloSurface, reach: f64, local: &[Oriented]) -> Option<SiloSurface> {
     let proposals = local.iter().filter_map(|o| {
-        let rho = o.p.x.hypot(o.p.y).max(1e-9);
-        let n_rho = (o.n.x * o.p.x + o.n.y * o.p.y) / rho;
+        let (rho, n_rho, _) = o.meridian();
         (n_rho < -0.97).then_some(SiloSurface { radius: Some(rho), ..*cone })
     });
     best(proposals, profile_score(cone, true, reach, local), reach, local)

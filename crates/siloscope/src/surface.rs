@@ -55,6 +55,11 @@ impl SiloSurface {
         }
     }
 
+    /// A length that tells how large the silo is: its radius, or the cone's radius halfway to the camera's height.
+    pub fn size(&self) -> f64 {
+        self.radius.or(self.cone.map(|c| 0.5 * c.slope * c.apex.abs())).unwrap_or(1.0)
+    }
+
     /// Adds a step of the fit; the depth bias is not part of the surface.
     pub fn stepped(&self, step: &Parameters) -> Self {
         Self {
@@ -183,6 +188,18 @@ impl PlacedSurface {
             _ => d[4] = -1.0,
         }
         d
+    }
+
+    /// How the axis' point at height z moves along x and y with the parameters: the turn's share and the shift's.
+    pub fn axis_shift(&self, z: f64) -> [Parameters; 2] {
+        let SiloPose { t_x, t_y, .. } = self.surface.pose;
+        let camera = self.rotation.transpose() * Vec3::new(-t_x, -t_y, z);
+        let (by_rx, by_ry) = (self.d_rx * camera, self.d_ry * camera);
+        [0, 1].map(|k| {
+            let mut row = Parameters::zeros();
+            (row[0], row[1], row[2 + k]) = (by_rx[k], by_ry[k], 1.0);
+            row
+        })
     }
 
     /// True depth at which the ray with direction `q` (camera frame, z = 1) meets the wall, and on which part.

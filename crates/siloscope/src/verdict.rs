@@ -119,7 +119,8 @@ fn seat(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall: &[bool], i: 
     let patch = &patches.list[i];
     let p = patch.at(if patches.cloud { 0.0 } else { fit.bias.true_depth(patch.measured) });
     let at = placed.local(&p);
-    let n = placed.turn(&patch.normal) * if fit.inside { -1.0 } else { 1.0 };
+    let n = placed.turn(&patch.normal);
+    let n = if n.dot(&at.gradient) < 0.0 { -n } else { n };
     let rho = at.p.x.hypot(at.p.y);
     let stretch = at.gradient.norm();
     Some(Seat {
@@ -168,7 +169,7 @@ fn behind(patches: &Patches, fit: &Fit, placed: &PlacedSurface) -> f64 {
         let at = placed.local(&p);
         at.value / at.gradient.norm() > reach(at.p.x.hypot(at.p.y)) + 5.0 * fit.misfit
     };
-    if !fit.inside {
+    if !fit.inside || patches.cloud {
         return 0.0;
     }
     (0..list.len()).filter(outside).count() as f64 / list.len().max(1) as f64

@@ -13,8 +13,10 @@ import siloscope
 from siloscope.cli import options
 from siloscope.cli.outcome import REFUSED, print_json, writing
 from siloscope.cli.progress import say
+from siloscope.errors import InputError
 from siloscope.estimate import Estimate
 from siloscope.frame import Frame
+from siloscope.inputs import metres
 
 
 def locate(
@@ -59,6 +61,8 @@ def locate(
     settings["gravity"] = None if gravity is None else options.numbers(gravity, 3, "--gravity")
     given = {name: value for name, value in settings.items() if value is not None}
     estimate = siloscope.locate(frame, mask=chosen, **given)
+    if estimate.reason == "no-depth" and frame.depth is not None and not (metres(frame) > 0).any():
+        raise InputError(f"{frame.source}: no pixel has a depth; check the stream and the sensor's window")
     return _answer(estimate, frame, chosen, out, as_json)
 
 

@@ -1,0 +1,229 @@
+//! The paper's six steps, one function each.
+
+use crate::convert::{camera, value_error};
+use numpy::{
+    Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
+};
+use pyo3::prelude::*;
+use siloscope::axis::{self, Wall};
+use siloscope::backproject::{DepthImage, Depths};
+use siloscope::candidates::{self, View};
+use siloscope::neighbours::Neighbours;
+use siloscope::shape_tensor::ShapeTensor;
+use siloscope::workers::Workers;
+use siloscope::{Vec3, backproject, grid, neighbours, normals, shape_tensor};
+
+type Doubles<'py> = PyReadonlyArray2<'py, f64>;
+type Vectors<'py> = Bound<'py, PyArray2<f64>>;
+type Numbers<'py> = Bound<'py, PyArray1<f64>>;
+type Indices<'py> = Bound<'py, PyArray1<u32>>;
+
+/// A stored depth image: metres as float32 or float64, raw units as uint16.
+#[derive(FromPyObject)]
+enum DepthArray<'py> {
+    Single(PyReadonlyArray2<'py, f32>),
+    Double(PyReadonlyArray2<'py, f64>),
+    Raw(PyReadonlyArray2<'py, u16>),
+}
+
+impl DepthArray<'_> {
+    fn depths(&self) -> PyResult<Depths<'_>> {
+        Ok(match self {
+            Self::Single(depth) => Depths::Single(entries(depth)?),
+            Self::Double(depth) => Depths::Double(entries(depth)?),
+            Self::Raw(depth) => Depths::Raw(entries(depth)?),
+        })
+    }
+}
+
+/// Entries of an array in C order, which the package sees to.
+fn entries<'a, T: Element>(array: &'a PyReadonlyArray2<'_, T>) -> PyResult<&'a [T]> {
+    match array.is_c_contiguous() {
+        true => Ok(array.as_slice()?),
+        false => Err(value_error("arrays must be in C order")),
+    }
+}
+
+fn vectors(array: &Doubles) -> PyResult<Vec<Vec3>> {
+    match array.shape() {
+        [_, 3] => Ok(entries(array)?.chunks_exact(3).map(Vec3::from_column_slice).collect()),
+        shape => Err(value_error(format!("expected vectors of shape (N, 3), got {shape:?}"))),
+    }
+}
+
+fn to_array<'py>(py: Python<'py>, vectors: &[Vec3]) -> PyResult<Vectors<'py>> {
+    let flat: Vec<f64> = vectors.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
+    flat.into_pyarray(py).reshape([vectors.len(), 3])
+}
+
+fn same_length(what: &str, got: usize, expected: usize) -> PyResult<()> {
+    match got == expected {
+        true => Ok(()),
+        false => Err(value_error(format!("{what} has {got} rows, expected {expected}"))),
+    }
+}
+
+fn near(neighbours: &PyReadonlyArray2<u32>, n: usize) -> PyResult<Neighbours> {
+    let [rows, k] = neighbours.shape() else { return Err(value_error("neighbours must be two-dimensional")) };
+    same_length("neighbours", *rows, n)?;
+    Neighbours::from_indices(*k, entries(neighbours)?.to_vec(), n).map_err(value_error)
+}
+
+fn view(name: &str) -> PyResult<View> {
+    match name {
+        "inside" => Ok(View::Inside),
+        "outside" => Ok(View::Outside),
+        "either" => Ok(View::Either),
+        other => Err(value_error(format!("view must be inside, outside or either, got '{other}'"))),
+    }
+}
+
+/// Pixels with a measurement, row by row, and their points (N, 3) in metres (Eqs. 1 and 2).
+#[pyfunction]
+fn back_project<'py>(
+    py: Python<'py>,
+    depth: DepthArray<'py>,
+    camera: &Bound<'py, PyAny>,
+    rays: Option<Doubles<'py>>,
+    unit: f64,
+    mask: Option<PyReadonlyArray2<'py, bool>>,
+) -> PyResult<(Indices<'py>, Vectors<'py>)> {
+    let camera = self::camera(camera)?;
+    let rays = rays.as_ref().map(rays_of).transpose()?;
+    let mask = mask.as_ref().map(entries).transpose()?;
+    let image = DepthImage::new(depth.depths()?, &camera, rays, unit, mask).map_err(value_error)?;
+    let (pixels, points) = py.detach(|| backproject::back_project(&image));
+    let pixels: Vec<u32> = pixels.into_iter().map(|pixel| pixel as u32).collect();
+    Ok((pixels.into_pyarray(py), to_array(py, &points)?))
+}
+
+fn rays_of<'a>(rays: &'a Doubles) -> PyResult<&'a [[f64; 2]]> {
+    match entries(rays)?.as_chunks() {
+        (rays, []) => Ok(rays),
+        _ => Err(value_error("rays must have the shape (H*W, 2)")),
+    }
+}
+
+/// Mean point of every occupied voxel (M, 3), in order of the voxels, and the number of points behind each.
+#[pyfunction]
+fn voxel_grid<'py>(
+    py: Python<'py>,
+    points: Doubles<'py>,
+    size: f64,
+    threads: usize,
+) -> PyResult<(Vectors<'py>, Indices<'py>)> {
+    let points = vectors(&points)?;
+    let cloud = py.detach(|| grid::voxel_grid(&points, size, &Workers::new(threads))).map_err(value_error)?;
+    Ok((to_array(py, &cloud.points)?, cloud.counts.into_pyarray(py)))
+}
+
+/// Indices (N, k) of the k nearest other points, nearest first.
+#[pyfunction]
+fn nearest_neighbours<'py>(
+    py: Python<'py>,
+    points: Doubles<'py>,
+    k: usize,
+    threads: usize,
+) -> PyResult<Bound<'py, PyArray2<u32>>> {
+    let points = vectors(&points)?;
+    let found = py.detach(|| neighbours::nearest_neighbours(&points, k, &Workers::new(threads)));
+    let found = found.map_err(value_error)?;
+    PyArray1::from_slice(py, found.indices()).reshape([points.len(), found.k()])
+}
+
+/// Unit normals (N, 3), turned towards the camera at the origin.
+#[pyfunction]
+fn hoppe_normals<'py>(
+    py: Python<'py>,
+    points: Doubles<'py>,
+    neighbours: PyReadonlyArray2<'py, u32>,
+    threads: usize,
+) -> PyResult<Vectors<'py>> {
+    let points = vectors(&points)?;
+    let near = near(&neighbours, points.len())?;
+    to_array(py, &py.detach(|| normals::normals(&points, &near, &Workers::new(threads))))
+}
+
+/// Principal curvatures k1 and k2 (N,) and principal directions E1 and E2 (N, 3).
+#[pyfunction]
+#[allow(clippy::type_complexity)]
+fn shape_tensors<'py>(
+    py: Python<'py>,
+    points: Doubles<'py>,
+    neighbours: PyReadonlyArray2<'py, u32>,
+    normals: Doubles<'py>,
+    threads: usize,
+) -> PyResult<(Numbers<'py>, Numbers<'py>, Vectors<'py>, Vectors<'py>)> {
+    let (points, normals) = (vectors(&points)?, vectors(&normals)?);
+    same_length("normals", normals.len(), points.len())?;
+    let near = near(&neighbours, points.len())?;
+    let tensors = py.detach(|| shape_tensor::shape_tensors(&points, &near, &normals, &Workers::new(threads)));
+    let number = |of: fn(&ShapeTensor) -> f64| tensors.iter().map(of).collect::<Vec<_>>().into_pyarray(py);
+    let vector = |of: fn(&ShapeTensor) -> Vec3| to_array(py, &tensors.iter().map(of).collect::<Vec<_>>());
+    Ok((number(|t| t.k1), number(|t| t.k2), vector(|t| t.e1)?, vector(|t| t.e2)?))
+}
+
+/// Indices of the candidates in order of rising |k2|, and their directions E1 (C, 3).
+#[pyfunction]
+#[allow(clippy::too_many_arguments)]
+fn select_candidates<'py>(
+    py: Python<'py>,
+    points: Doubles<'py>,
+    k1: PyReadonlyArray1<'py, f64>,
+    k2: PyReadonlyArray1<'py, f64>,
+    e1: Doubles<'py>,
+    e2: Doubles<'py>,
+    share: f64,
+    view: &str,
+) -> PyResult<(Indices<'py>, Vectors<'py>)> {
+    let (points, e1, e2) = (vectors(&points)?, vectors(&e1)?, vectors(&e2)?);
+    let (k1, k2, view) = (k1.as_array(), k2.as_array(), self::view(view)?);
+    for (what, got) in [("k1", k1.len()), ("k2", k2.len()), ("E1", e1.len()), ("E2", e2.len())] {
+        same_length(what, got, points.len())?;
+    }
+    let directions = e1.into_iter().zip(e2);
+    let tensors: Vec<ShapeTensor> = k1
+        .iter()
+        .zip(k2)
+        .zip(directions)
+        .map(|((k1, k2), (e1, e2))| ShapeTensor { k1: *k1, k2: *k2, e1, e2 })
+        .collect();
+    let found = candidates::select_candidates(&points, &tensors, share, view);
+    let index: Vec<u32> = found.iter().map(|c| c.index as u32).collect();
+    Ok((index.into_pyarray(py), to_array(py, &found.iter().map(|c| c.e1).collect::<Vec<_>>())?))
+}
+
+/// Axis direction X and the rising eigenvalues of S/n (Eq. 3).
+#[pyfunction]
+fn axis_direction(e1: Doubles) -> PyResult<([f64; 3], [f64; 3])> {
+    let direction = axis::axis_direction(vectors(&e1)?.into_iter());
+    Ok((direction.x.into(), direction.spread))
+}
+
+/// Estimated axis points (M, 3): silo x and y, and the distance along X (Eq. 4).
+#[pyfunction]
+fn axis_points<'py>(
+    py: Python<'py>,
+    points: Doubles<'py>,
+    normals: Doubles<'py>,
+    direction: [f64; 3],
+    partners: usize,
+    threads: usize,
+) -> PyResult<Vectors<'py>> {
+    let (points, normals) = (vectors(&points)?, vectors(&normals)?);
+    same_length("normals", normals.len(), points.len())?;
+    let walls: Vec<Wall> = points.into_iter().zip(normals).map(|(p, normal)| Wall { p, normal }).collect();
+    let estimates = py.detach(|| axis::axis_points(&walls, &direction.into(), partners, &Workers::new(threads)));
+    to_array(py, &estimates.iter().map(|e| Vec3::new(e.at.x, e.at.y, e.along)).collect::<Vec<_>>())
+}
+
+pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_function(wrap_pyfunction!(back_project, m)?)?;
+    m.add_function(wrap_pyfunction!(voxel_grid, m)?)?;
+    m.add_function(wrap_pyfunction!(nearest_neighbours, m)?)?;
+    m.add_function(wrap_pyfunction!(hoppe_normals, m)?)?;
+    m.add_function(wrap_pyfunction!(shape_tensors, m)?)?;
+    m.add_function(wrap_pyfunction!(select_candidates, m)?)?;
+    m.add_function(wrap_pyfunction!(axis_direction, m)?)?;
+    m.add_function(wrap_pyfunction!(axis_points, m)?)
+}

@@ -1,0 +1,69 @@
+//! Step 3: points that potentially lie on the cylinder or the cone.
+
+use crate::Vec3;
+use crate::shape_tensor::ShapeTensor;
+
+/// From which side the walls are seen; it tells the sign of their curvature, as normals point to the camera.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum View {
+    /// From inside: walls bend towards the camera, k1 = 1/R (Property 5).
+    #[default]
+    Inside,
+    /// From outside: walls bend away, and it is the other principal curvature that is -1/R.
+    Outside,
+    /// Unknown, or from several places at once.
+    Either,
+}
+
+impl View {
+    fn allows(self, curvature: f64) -> bool {
+        match self {
+            Self::Inside => curvature > 0.0,
+            Self::Outside => curvature < 0.0,
+            Self::Either => true,
+        }
+    }
+}
+
+/// A point that may lie on a wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// Which point of the cloud.
+    pub index: usize,
+    /// The principal curvature across the generatrix: k1 seen from inside, k2 from outside.
+    pub bent: f64,
+    /// The one along it, which is 0 on cylinder and cone (Property 1).
+    pub straight: f64,
+    /// The principal direction of `bent`, perpendicular to the axis (Property 3).
+    pub e1: Vec3,
+}
+
+impl Candidate {
+    /// Of the two principal curvatures the one greater in size is taken as the bent one.
+    fn new(index: usize, t: &ShapeTensor) -> Self {
+        match t.k1.abs() >= t.k2.abs() {
+            true => Self { index, bent: t.k1, straight: t.k2, e1: t.e1 },
+            false => Self { index, bent: t.k2, straight: t.k1, e1: t.e2 },
+        }
+    }
+}
+
+/// The `share` of the points with the smallest |k2|, in that order, among those with a clear k1.
+///
+/// Clear is a curvature whose radius is less than the extent of the cloud: a silo is seen from within its own radius,
+/// and flatter ground has no direction of curvature but noise.
+pub fn select_candidates(points: &[Vec3], tensors: &[ShapeTensor], share: f64, view: View) -> Vec<Candidate> {
+    let least = 1.0 / extent(points);
+    let clear = |c: &Candidate| c.bent.abs() > least && view.allows(c.bent);
+    let mut candidates: Vec<_> = tensors.iter().enumerate().map(|(i, t)| Candidate::new(i, t)).filter(clear).collect();
+    candidates.sort_by(|a, b| a.straight.abs().total_cmp(&b.straight.abs()));
+    candidates.truncate((share * points.len() as f64).ceil() as usize);
+    candidates
+}
+
+/// Diagonal of the cloud's bounding box.
+fn extent(points: &[Vec3]) -> f64 {
+    let low = points.iter().fold(Vec3::repeat(f64::INFINITY), |low, p| low.inf(p));
+    let high = points.iter().fold(Vec3::repeat(f64::NEG_INFINITY), |high, p| high.sup(p));
+    (high - low).norm()
+}
