@@ -1,4 +1,4 @@
-"""Small files of every base format, made from scratch: what tests read and mutate."""
+"""Small files of every base format, made from scratch, and how tests read them."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from siloscope import Camera, camera_files
+import siloscope.frames
+from siloscope import Camera, Frame, camera_files
 
 HEIGHT, WIDTH = 48, 64
 CAMERA = Camera(WIDTH, HEIGHT, 57.25, 57.5, 31.75, 23.25)
@@ -36,6 +37,19 @@ def organised() -> NDArray[np.float32]:
 
 POINTS = organised()
 CLOUD = POINTS[np.isfinite(POINTS).all(axis=2)]
+
+
+def read(path: Path, **options: object) -> Frame:
+    """The only frame of a file."""
+    with siloscope.frames.open(path, **options) as source:  # type: ignore[arg-type]
+        (frame,) = source
+    return frame
+
+
+def put(folder: Path, content: bytes, name: str = "file") -> Path:
+    """A file with this content."""
+    (folder / name).write_bytes(content)
+    return folder / name
 
 
 def chunk(kind: bytes, data: bytes) -> bytes:

@@ -20,6 +20,7 @@ import tracemalloc
 import warnings
 import zlib
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import islice
 from pathlib import Path
 
@@ -29,19 +30,30 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import frame_files
 import siloscope.frames
-from siloscope import InputError
+from siloscope import InputError, camera_files
+
+
+def _camera_file(suffix: str) -> Callable[[], bytes]:
+    def make() -> bytes:
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / f"camera{suffix}"
+            camera = replace(frame_files.CAMERA, distortion_model="rational", distortion=(0.5, -0.02, 1e-5, 2e-5))
+            camera_files.dump(camera, path, depth_unit=None if suffix == ".yaml" else 0.001)
+            return path.read_bytes()
+
+    return make
 
 
 def _first_lines(name: str, count: int) -> Callable[[], bytes]:
     return lambda: b"".join(frame_files.MAKERS[name]().splitlines(keepends=True)[:count])
 
 
+_SHORT = {"points.xyz": 200, "points.csv": 200, "image.csv": 12}
+
 SEEDS: dict[str, Callable[[], bytes]] = {
     **frame_files.MAKERS,
-    **{
-        name: _first_lines(name, count)
-        for name, count in {"points.xyz": 200, "points.csv": 200, "image.csv": 12}.items()
-    },
+    **{name: _first_lines(name, count) for name, count in _SHORT.items()},
+    **{f"camera{suffix}": _camera_file(suffix) for suffix in (".json", ".toml", ".yaml")},
 }
 """Good files by name, the text tables short; formats with makers of their own add them here."""
 
@@ -152,6 +164,9 @@ def broken_rule(path: Path) -> str | None:
 
 
 def _read(path: Path) -> None:
+    if "camera" in path.name:
+        camera_files.read(path)
+        return
     with siloscope.frames.open(path, depth_unit=0.001) as source:
         source.describe()
         for frame in islice(source, 100):

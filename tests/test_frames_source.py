@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import numpy as np
@@ -71,6 +72,36 @@ def test_nothing_readable_is_an_error(png: Path) -> None:
 def test_impossible_units_are_refused(png: Path, unit: float) -> None:
     with pytest.raises(UsageError, match="depth unit"):
         siloscope.frames.open(png, depth_unit=unit)
+
+
+def test_a_file_that_vanishes_after_opening_is_an_input_error(png: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    source = siloscope.frames.open(png, depth_unit=0.001)
+    png.unlink()
+    with pytest.raises(InputError, match=r"depth\.png: can't be read"):
+        list(source)
+
+
+def test_frames_can_be_taken_by_number(png: Path) -> None:
+    source = siloscope.frames.open([png, png], depth_unit=0.001)
+    assert source.frame_count == 2
+    assert np.array_equal(source[1].depth, RAW)
+    for index in (2, -1):
+        with pytest.raises(IndexError):
+            source[index]
+
+
+def test_special_files_and_bad_paths_are_refused(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    with pytest.raises(InputError, match="not a file or folder"):
+        siloscope.frames.open(tmp_path / "pipe")
+    (tmp_path / "empty.png").touch()
+    with pytest.raises(InputError, match="the file is empty"):
+        siloscope.frames.open(tmp_path / "empty.png")
+    for bad in ("missing\0name", "x" * 5000):
+        with pytest.raises(InputError):
+            siloscope.frames.open(tmp_path / bad)
+    with pytest.raises(UsageError):
+        siloscope.frames.open([])
 
 
 def test_unknown_content_is_named(tmp_path: Path) -> None:

@@ -22,13 +22,17 @@ DISTORTION_NAMES = {
 }
 """What others call the distortion models (in lower case, words apart by one space) and what they are called here."""
 
+_POLYNOMIALS = ("brown_conrady", "inverse_brown_conrady", "rational")
 _ZERO_IS_PINHOLE = ("modified brown conrady",)
 
 
 def distortion_model(name: str, model: str, coefficients: Sequence[float]) -> str:
-    """Our name of a distortion model, whoever named it; unknown ones are refused by name."""
+    """Our name of a distortion model, whoever named it; unknown ones are refused by name.
+
+    A polynomial whose coefficients are all 0 is none: many drivers name a model that they don't use.
+    """
     words, zero = _words(model), not any(coefficients)
-    if zero and (not words or words in _ZERO_IS_PINHOLE):
+    if zero and (not words or words in _ZERO_IS_PINHOLE or DISTORTION_NAMES.get(words) in _POLYNOMIALS):
         return "none"
     if not words:
         raise InputError(f"{name}: distortion coefficients without a model; name it as 'distortion_model'")

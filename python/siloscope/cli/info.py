@@ -39,16 +39,15 @@ def info(
 
 
 def print_description(document: dict[str, Any]) -> None:
-    """A table on stdout."""
+    """A table on stdout, a line a row however long."""
     from rich.console import Console
-    from rich.table import Table
+    from rich.text import Text
 
-    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
-    table.add_column(style="bold")
-    table.add_column(overflow="fold")
-    for key, text in rows(document):
-        table.add_row(key, text)
-    Console(highlight=False, markup=False, soft_wrap=True).print(table)
+    known = rows(document)
+    width = max(len(key) for key, _ in known) + 2
+    console = Console(highlight=False, soft_wrap=True)
+    for key, text in known:
+        console.print(Text.assemble((key.ljust(width), "bold"), text))
 
 
 def rows(document: dict[str, Any]) -> list[tuple[str, str]]:
@@ -77,8 +76,9 @@ def _frames(document: dict[str, Any]) -> str:
 
 def _stream(stream: dict[str, Any]) -> str:
     size = " x ".join(map(str, stream.get("size") or ())) or "size unknown"
-    what = "points" if len(stream.get("size") or ()) == 1 else "pixels"
-    count = "" if stream.get("frames") is None else f", {stream['frames']} frames"
+    what = "points" if stream.get("kind") == "points" else "pixels"
+    frames = stream.get("frames")
+    count = "" if frames is None else f", {frames} {'frame' if frames == 1 else 'frames'}"
     return f"{stream.get('name')}: {stream.get('kind')}, {size} {what}, {stream.get('dtype') or 'type unknown'}{count}"
 
 

@@ -23,6 +23,7 @@ _MODULES = (
     # Own magic bytes first, plain text last.
     "png",
     "npy",
+    "npz",
     "ply",
     "pcd",
     "tiff",
@@ -102,7 +103,11 @@ def sniff(path: StrPath) -> Format:
 
 
 def _open_one(path: Path, options: Options) -> FrameSource:
-    return sniff(path).open(path, options)
+    try:
+        return sniff(path).open(path, options)
+    except OSError as error:
+        cause = error.strerror or str(error)
+        raise InputError(f"{path}: can't be read ({cause}); check the path and its permissions") from None
 
 
 def _open_or_tell(path: Path, options: Options) -> FrameSource:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,8 @@ from siloscope.frames.source import FrameSource, Item, Options, check_image_size
 Columns = Mapping[str, NDArray[Any]]
 """Fields of a cloud by name, each (N,)."""
 
+RECOVERED = "recovered from the organised points"
+
 LABEL_NAMES = ("label", "labels", "class", "classification", "segment", "scalar_label", "scalar_Label")
 
 
@@ -29,6 +32,7 @@ class CloudSource(FrameSource):
     def __init__(self, path: Path, format: str, options: Options, read: Callable[[Path], Frame]) -> None:
         super().__init__(path, format, options)
         self.size: list[int] = []
+        self.dtype = ""
         self._read = read
 
     def _items(self) -> Iterator[Item]:
@@ -44,9 +48,12 @@ class CloudSource(FrameSource):
     def _recovered(self) -> Camera | None:
         try:
             with np.errstate(all="ignore"):
-                return self._read(self.path).camera
+                camera = self._read(self.path).camera
         except InputError:
             return None  # told where the frame itself is asked for
+        if camera is not None:
+            self.provenance["camera_from"] = RECOVERED
+        return camera
 
     def _count(self) -> int:
         return 1
@@ -92,11 +99,15 @@ def _organised(name: str, frame: Frame, grid: tuple[int, int] | None) -> Frame:
     if rows * columns != len(points):
         raise InputError(f"{name}: declared {columns} x {rows} points but has {len(points)}; export it again")
     check_image_size(name, columns, rows)
-    points = points.reshape(rows, columns, 3)
-    camera = recover_camera(points)
-    origin = {"camera_from": "recovered from the organised points"} if camera else {}
     labels = labels if labels is None else labels.reshape(rows, columns)
-    return Frame(points=points, labels=labels, camera=camera, source=name, provenance=origin)
+    return with_recovered_camera(replace(frame, points=points.reshape(rows, columns, 3), labels=labels))
+
+
+def with_recovered_camera(frame: Frame) -> Frame:
+    """A frame of organised points with the camera that made them, where one fits and none is known."""
+    if frame.points is None or frame.camera is not None or (camera := recover_camera(frame.points)) is None:
+        return frame
+    return replace(frame, camera=camera, provenance={**frame.provenance, "camera_from": RECOVERED})
 
 
 _MOST_RMS_PX = 0.05

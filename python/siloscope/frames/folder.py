@@ -14,7 +14,7 @@ import numpy as np
 
 from siloscope.errors import InputError
 from siloscope.frame import Frame
-from siloscope.frames import npy, pcd, ply, png, tiff
+from siloscope.frames import npy, npz, pcd, ply, png, tiff
 from siloscope.frames.beside import take_camera_beside
 from siloscope.frames.source import Format, FrameSource, Item, Options
 
@@ -25,7 +25,7 @@ TUM_DEPTH_UNIT = 0.0002
 FRAME_LIST = "frames.json"
 """What `siloscope convert` writes beside the frames: their names, times and gravity."""
 
-_FORMATS = (png.FORMAT, tiff.FORMAT, npy.FORMAT, ply.FORMAT, pcd.FORMAT)
+_FORMATS = (png.FORMAT, tiff.FORMAT, npy.FORMAT, npz.FORMAT, ply.FORMAT, pcd.FORMAT)
 _LARGEST_LIST = 64 << 20
 _ALONE = Options(beside=False)
 

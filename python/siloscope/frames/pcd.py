@@ -181,6 +181,7 @@ class PcdSource(CloudSource):
         with path.open("rb") as file:
             header = read_header(self.name, file.read(_LONGEST_HEADER))
         self.size = [header.width, header.height] if header.height > 1 else [header.points]
+        self.dtype = next((field.dtype.name for field in header.fields if field.name == "x"), "unknown")
         self.provenance |= {"storage": header.storage, "fields": [field.name for field in header.fields]}
         if header.viewpoint:
             self.provenance["viewpoint"] = " ".join(header.viewpoint)

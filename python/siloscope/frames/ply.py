@@ -158,6 +158,8 @@ class PlySource(CloudSource):
         with path.open("rb") as file:
             header = read_header(self.name, file.read(_LONGEST_HEADER))
         self.size = list(reversed(header.grid)) if header.grid else [header.vertices.count]
+        kinds = dict(header.vertices.properties)
+        self.dtype = np.dtype(kinds["x"]).name if kinds.get("x") else "unknown"
         self.provenance["storage"] = {"": "ascii", "<": "binary", ">": "binary, big-endian"}[header.order]
 
 

@@ -214,7 +214,10 @@ class FrameSource(ABC):
 
     def _completed(self, item: Item) -> Frame:
         """The frame as stored, with what the whole source knows about it."""
-        frame = item.read()
+        try:
+            frame = item.read()
+        except OSError as error:  # gone, or not allowed, since it was opened
+            raise InputError(f"{self.name}: {item.label} can't be read ({error.strerror or error}); check it") from None
         return replace(
             frame,
             camera=frame.camera or self.file_camera,

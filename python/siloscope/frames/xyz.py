@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from siloscope.errors import InputError
 from siloscope.frame import Frame
+from siloscope.frames.beside import take_camera_beside
 from siloscope.frames.clouds import cloud_frame
 from siloscope.frames.layout import Layout, is_number, layout
 from siloscope.frames.source import Format, FrameSource, Item, Options, check_image_size, read_bytes
@@ -38,6 +39,7 @@ class TableSource(FrameSource):
         self._columns = len(lines[self.layout.first].split(self.layout.delimiter))
         if self.layout.columns is None:
             check_image_size(self.name, self._columns, self._rows)
+            take_camera_beside(self, (self._columns, self._rows))
         if self.layout.unit_from:
             self.provenance |= {"unit": self.layout.unit, "unit_from": self.layout.unit_from}
 
