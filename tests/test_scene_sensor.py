@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from siloscope import Camera
+from siloscope import Camera, _core
 from siloscope.paper.scenarios import SILO2
 from siloscope.scene import ASTRA_S, Defects, Feed, Scene, SensorModel, SimulatedFrame
 
@@ -154,3 +154,16 @@ def test_a_bent_lens_changes_the_rays_and_nothing_else(device: str) -> None:
     x, y, _ = np.moveaxis(SCENE.pose.to_silo(rays * frame.depth[..., None]), -1, 0)
     on_wall = frame.labels == 1
     assert np.abs(np.hypot(x, y)[on_wall] - SCENE.silo.radius).max() < 1e-12
+
+
+def test_the_binding_takes_any_layout_and_refuses_arrays_that_do_not_belong_together() -> None:
+    frame = replace(SCENE, sensor=ASTRA_S, seed=1).render()
+    depth, labels, normals = frame.depth.ravel(), frame.labels.ravel(), frame.normals.reshape(-1, 3)
+    strided = (np.repeat(depth, 2)[::2], np.repeat(labels, 2)[::2], np.asfortranarray(normals))
+    again, _ = _core.measure_depth(ASTRA_S, CAMERA, *strided, 1, 1)
+    assert np.array_equal(again, frame.measured.ravel())
+    blank, _ = _core.measure_depth(ASTRA_S, CAMERA, depth * np.nan, labels, normals * np.nan, 1, 1)
+    assert not blank.any()
+    for parts in [(depth[:-1], labels, normals), (depth[:0], labels, normals[:0]), (depth, labels, normals[:, :2])]:
+        with pytest.raises(ValueError, match=r"normals|depth"):
+            _core.measure_depth(ASTRA_S, CAMERA, *parts, 1, 1)

@@ -154,8 +154,10 @@ impl Sensor {
         self.validate()?;
         check_threads(threads)?;
         let pixels = camera.width * camera.height;
-        if exact.depth.len() != pixels {
-            return Err(Error::Shape { what: "depth", got: exact.depth.len(), expected: pixels });
+        for (what, got) in [("depth", exact.depth.len()), ("normals", exact.normals.len())] {
+            if got != pixels {
+                return Err(Error::Shape { what, got, expected: pixels });
+            }
         }
         let mut out = Measured { depth: vec![0.0; pixels], false_returns: vec![false; pixels] };
         let band = camera.height.div_ceil(threads) * camera.width;
