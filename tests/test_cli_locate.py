@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import realdata
 import siloscope
 from siloscope.cli import main
 from siloscope.locate import METHODS
@@ -101,6 +102,64 @@ def test_part_of_the_frame(place: Path, tmp_path: Path, kind: str, capsys: Shown
     code, document = answer([*arguments(place, "frame.npy"), *more], capsys)
     assert code == 0
     assert document["t_x"] == pytest.approx(TRUTH.t_x, abs=5e-3)
+
+
+def test_profile_stands_in_for_a_missing_camera(place: Path, tmp_path: Path, capsys: Shown) -> None:
+    alone = tmp_path / "alone.npy"
+    alone.write_bytes((place / "frame.npy").read_bytes())
+    code, document = answer(["locate", str(alone), "--sensor", "orbbec-astra-s", "--out", str(tmp_path / "o")], capsys)
+    assert code == 0
+    assert document["config"]["camera"]["fx"] == pytest.approx(570.3, abs=1.0)
+    assert (tmp_path / "o" / "clouds.png").exists()
+
+
+@pytest.mark.parametrize(
+    ("parts", "options"),
+    [
+        (
+            ("pcl_mug_cylinder", "table_scene_mug_stereo_textured.pcd"),
+            ["--crop=0.005,0.105,0.03,0.11,0.70,0.80", "--grid", "0.003"],
+        ),
+        (("mosd_kinect_cylindric", "learn36.pcd"), ["--label", "43", "--grid", "0.004"]),
+        (("tank_total_station", "scan.csv"), []),
+    ],
+    ids=lambda value: value[0] if isinstance(value, tuple) else "",
+)
+def test_real_surfaces_of_revolution(parts: tuple[str, str], options: list[str], tmp_path: Path, capsys: Shown) -> None:
+    file = str(realdata.path(*parts))
+    code, document = answer(["locate", file, *options, "--out", str(tmp_path)], capsys)
+    assert code == 0
+    axis, point = (np.array(document["axis"][name]) for name in ("direction", "point"))
+    reference = REFERENCES[parts[0]]
+    sine = np.linalg.norm(np.cross(axis, reference["axis"])) / np.linalg.norm(reference["axis"])
+    assert np.degrees(np.arcsin(sine)) < reference["degrees"]
+    if "radius" in reference:
+        assert document["silo"]["radius"] == pytest.approx(reference["radius"], abs=reference["radius_within"])
+    if "point" in reference:
+        assert np.linalg.norm(np.cross(np.subtract(reference["point"], point), axis)) < reference["point_within"]
+    assert (tmp_path / "profile.png").exists()
+
+
+REFERENCES: dict[str, dict[str, Any]] = {
+    "pcl_mug_cylinder": {
+        "axis": (-0.0135876, 0.834831, 0.550338),
+        "degrees": 2.0,
+        "point": (0.0543319, 0.100139, 0.787577),
+        "point_within": 5e-3,
+        "radius": 0.0387446,
+        "radius_within": 3e-3,
+    },
+    "mosd_kinect_cylindric": {"axis": (0.0014, -0.8243, -0.5661), "degrees": 4.0},
+    "tank_total_station": {
+        "axis": (0.0, 0.0, 1.0),
+        "degrees": 1.0,
+        "point": (37.350, 25.713, 0.0),
+        "point_within": 0.05,
+        "radius": 7.585,
+        "radius_within": 0.02,
+    },
+}
+"""What others found, as the recordings' own notes have it."""
 
 
 def flat_wall(path: Path) -> None:

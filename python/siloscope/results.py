@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import writers
+from siloscope.camera import Camera
 from siloscope.estimate import Estimate
 from siloscope.frame import Frame
 from siloscope.pose import SiloPose
@@ -28,6 +30,7 @@ def write_results(directory: Path, frame: Frame, estimate: Estimate, mask: Mask 
     """
     from siloscope.plots import save
 
+    frame = _with_camera(frame, estimate)
     directory.mkdir(parents=True, exist_ok=True)
     document = directory / "estimate.json"
     document.write_text(json.dumps(estimate.to_dict(), indent=2) + "\n", "utf-8")
@@ -47,6 +50,12 @@ def _adjusted(directory: Path, frame: Frame, estimate: Estimate) -> list[Path]:
         placed = estimate.pose.to_silo(cloud).astype(np.float32)
         writers.write_ply(written[-1], placed, comments=["silo frame, metres, z down"])
     return written
+
+
+def _with_camera(frame: Frame, estimate: Estimate) -> Frame:
+    """The frame with the camera that the estimate used, which may be the sensor profile's."""
+    used = estimate.config.get("camera")
+    return frame if frame.camera is not None or not used else replace(frame, camera=Camera(**used))
 
 
 def seen_points(frame: Frame, mask: Mask | None = None) -> NDArray[np.float64]:
@@ -81,6 +90,7 @@ def pictures(frame: Frame, estimate: Estimate, mask: Mask | None = None) -> dict
     """The pictures that a frame and its estimate allow, by the name that files of them get."""
     from siloscope import plots
 
+    frame = _with_camera(frame, estimate)
     made: dict[str, Figure] = {}
     depth = None if frame.depth is None else depth_metres(frame)
     if depth is not None:

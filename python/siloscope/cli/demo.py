@@ -7,10 +7,11 @@ from typing import Annotated, Any
 
 import typer
 
+from siloscope.calibration import Calibration
 from siloscope.cli import options
 from siloscope.cli.outcome import print_json, writing
 from siloscope.cli.progress import say, track
-from siloscope.demo import Step, locate_all, scenes, write_frame
+from siloscope.demo import Step, fused, locate_all, scenes, write_frame
 
 
 def demo(
@@ -28,22 +29,29 @@ def demo(
         out.mkdir(parents=True, exist_ok=True)
     done = list(track(locate_all(scenes(steps)), "locating", total=steps))
     say("drawing the report")
-    report = _write(done, out)
+    calibration = fused(done)
+    report = _write(done, calibration, out)
     found = sum(step.estimates["surface"].ok for step in done)
     if as_json:
-        print_json(_document(done, report))
+        print_json(_document(done, calibration, report))
     else:
         typer.echo(f"{found} of {steps} frames answered. The report: {report}")
 
 
-def _write(done: list[Step], out: Path) -> Path:
+def _write(done: list[Step], calibration: Calibration, out: Path) -> Path:
     from siloscope.demo.page import page
 
-    finished = page(done)
+    finished = page(done, calibration)
     with writing(out):
         write_frame(done[-1].seen, out)
+        calibration.save(out / "calibration.json")
         return finished.write(out / "report.html")
 
 
-def _document(done: list[Step], report: Path) -> dict[str, Any]:
-    return {"schema": "siloscope.demo/1", "report": str(report), "frames": [step.to_dict() for step in done]}
+def _document(done: list[Step], calibration: Calibration, report: Path) -> dict[str, Any]:
+    return {
+        "schema": "siloscope.demo/1",
+        "report": str(report),
+        "frames": [step.to_dict() for step in done],
+        "calibration": {key: value for key, value in calibration.to_dict().items() if key != "evidence"},
+    }

@@ -7,16 +7,18 @@ from typing import Annotated, Any
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 import siloscope
+from siloscope import region
 from siloscope.cli import options
 from siloscope.cli.outcome import REFUSED, print_json, writing
 from siloscope.cli.progress import say
+from siloscope.cli.summary import print_estimate
 from siloscope.errors import InputError
 from siloscope.estimate import Estimate
 from siloscope.frame import Frame
 from siloscope.inputs import metres
+from siloscope.region import Mask
 
 
 def locate(
@@ -37,7 +39,9 @@ def locate(
     grid: Annotated[
         float | None, typer.Option(metavar="M", help="Edge of the voxel grid's cells; 0.05 m unless given.")
     ] = None,
-    neighbours: Annotated[int | None, typer.Option(min=3, help="Neighbours for normals and shape tensors.")] = None,
+    neighbours: Annotated[
+        int | None, typer.Option(help="Neighbours for normals and shape tensors; 30 unless given.")
+    ] = None,
     gravity: options.Gravity = None,
     number: Annotated[int, typer.Option("--frame", min=0, help="Which frame of several, from 0.")] = 0,
     stream: options.Stream = None,
@@ -55,42 +59,46 @@ def locate(
         several = source.frame_count != 1
     if several and not as_json:
         say(f"{frame.source}; choose another with --frame")
-    chosen = selection(frame, mask, label, crop)
+    box = None if crop is None else options.numbers(crop, 6, "--crop")
+    chosen = selection(frame, mask, label)
     settings: dict[str, Any] = {"method": method, "sensor": sensor, "diameter": diameter, "threads": threads}
     settings |= {"grid": grid, "neighbours": neighbours}
     settings["gravity"] = None if gravity is None else options.numbers(gravity, 3, "--gravity")
     given = {name: value for name, value in settings.items() if value is not None}
-    estimate = siloscope.locate(frame, mask=chosen, **given)
+    estimate = siloscope.locate(frame, mask=chosen, crop=box, **given)
     if estimate.reason == "no-depth" and frame.depth is not None and not (metres(frame) > 0).any():
         raise InputError(f"{frame.source}: no pixel has a depth; check the stream and the sensor's window")
-    return _answer(estimate, frame, chosen, out, as_json)
-
-
-def selection(frame: Frame, mask: Path | None, label: int | None, crop: str | None) -> NDArray[np.bool_] | None:
-    """What --mask, --label and --crop leave of a frame; None where none is given."""
-    from siloscope import region
-
-    shape = (frame.points[..., 0] if frame.points is not None else np.asarray(frame.depth)).shape
-    parts = [
-        None if mask is None else region.read_mask(mask, shape),
-        None if label is None else region.label_mask(frame, label),
-        None if crop is None else region.box_mask(frame, options.numbers(crop, 6, "--crop")),
-    ]
-    given = [part for part in parts if part is not None]
-    return np.logical_and.reduce(given) if given else None
-
-
-def _answer(estimate: Estimate, frame: Frame, mask: Any, out: Path | None, as_json: bool) -> int:
-    from siloscope.cli.summary import print_estimate
-
     if out is not None:
-        from siloscope.results import write_results
-
-        with writing(out):
-            written = write_results(out, frame, estimate, mask)
-        say(f"wrote {len(written)} files to {out}")
+        _write(out, frame, estimate, within(frame, chosen, box))
     if as_json:
         print_json(estimate.to_dict())
     else:
         print_estimate(estimate, frame.source)
     return 0 if estimate.ok else REFUSED
+
+
+def selection(frame: Frame, mask: Path | None, label: int | None) -> Mask | None:
+    """What --mask and --label leave of a frame; None where neither is given."""
+    shape = (frame.points[..., 0] if frame.points is not None else np.asarray(frame.depth)).shape
+    parts = [
+        None if mask is None else region.read_mask(mask, shape),
+        None if label is None else region.label_mask(frame, label),
+    ]
+    given = [part for part in parts if part is not None]
+    return np.logical_and.reduce(given) if given else None
+
+
+def within(frame: Frame, chosen: Mask | None, box: tuple[float, ...] | None) -> Mask | None:
+    """The chosen part of a frame that lies in the box."""
+    if box is None:
+        return chosen
+    inside = region.box_mask(frame, box)
+    return inside if chosen is None else inside & chosen
+
+
+def _write(out: Path, frame: Frame, estimate: Estimate, shown: Mask | None) -> None:
+    from siloscope.results import write_results
+
+    with writing(out):
+        written = write_results(out, frame, estimate, shown)
+    say(f"wrote {len(written)} files to {out}")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import siloscope
+from siloscope.calibration import Calibration
 from siloscope.estimate import Estimate
 from siloscope.paper.metrics import pc_average_distance, transform_error
 from siloscope.paper.scenarios import looking_at
@@ -111,6 +112,11 @@ def _distance(seen: SimulatedFrame, estimate: Estimate) -> float:
 
 def _sensor(method: str) -> str | None:
     return SENSOR if method == "surface" else None
+
+
+def fused(steps: Sequence[Step]) -> Calibration:
+    """All frames of the discharge as one calibration of the silo."""
+    return siloscope.calibrate([step.estimates["surface"] for step in steps])
 
 
 def write_frame(seen: SimulatedFrame, directory: Path) -> None:

@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 
 import siloscope
 from siloscope import plots
+from siloscope.calibration import Calibration
 from siloscope.demo import METHODS, SCENE, SENSOR, Step
+from siloscope.paper.metrics import transform_error
 from siloscope.report import Report, command, picture, table, text
 from siloscope.results import pictures
 
@@ -19,8 +21,8 @@ _NAMES = {"surface": "surface fit", "shape-tensor": "the paper's six steps"}
 _DPI = 100
 
 
-def page(steps: Sequence[Step]) -> Report:
-    """The report of a discharge."""
+def page(steps: Sequence[Step], calibration: Calibration) -> Report:
+    """The report of a discharge and what all its frames say together."""
     last = steps[-1]
     report = Report(
         "A silo, emptied in front of a depth camera",
@@ -33,6 +35,7 @@ def page(steps: Sequence[Step]) -> Report:
     shown = pictures(last.seen.frame(), last.estimates["surface"])
     report.section("What was found in the last frame", *_found(last), _png(shown["clouds"], _CLOUDS))
     report.section("Over the discharge", *_discharge(steps))
+    report.section("All frames together", *_calibration(steps, calibration))
     report.section("How it is found", *_how(shown))
     report.section("What this means, and what it does not", *_meaning(steps))
     return report.section("Your own frame", *_yours())
@@ -128,6 +131,33 @@ def _spread(distance: NDArray[np.float64]) -> list[str]:
     if not len(found):
         return [f"0 of {len(distance)}", "–", "–"]
     return [f"{len(found)} of {len(distance)}", _mm(np.median(found)), _mm(found.max())]
+
+
+def _calibration(steps: Sequence[Step], found: Calibration) -> list[str]:
+    """What fusing the discharge gains over its best frame."""
+    if found.pose is None:
+        return [text(f"No calibration: {found.message}")]
+    truth = SCENE.pose
+    error = np.array(list(transform_error(found.pose, truth).to_dict().values()))
+    std = np.sqrt(np.diag(found.covariance)) if found.covariance is not None else np.full(4, np.nan)
+    last = steps[-1]
+    rows = [
+        [name, *_error_cells(i, last.error("surface")[i], last.std("surface")[i]), *_error_cells(i, error[i], std[i])]
+        for i, name in enumerate(("r_x", "r_y", "t_x", "t_y"))
+    ]
+    return [
+        text(
+            "A silo is emptied and filled for years, and its camera stays where it is. So the frames are fused: each "
+            "counts by what it shows, and those that disagree don't count. This is what is kept for a silo, in "
+            "calibration.json."
+        ),
+        table(["", "last frame: error", "one std", f"{found.counts['used']} frames fused: error", "one std"], rows),
+    ]
+
+
+def _error_cells(parameter: int, error: float, std: float) -> list[str]:
+    unit = "mrad" if parameter < 2 else "mm"
+    return [f"{1e3 * error:+.4f} {unit}", f"± {1e3 * std:.4f}"]
 
 
 def _how(shown: dict[str, Any]) -> list[str]:
