@@ -14,8 +14,8 @@ from siloscope.estimate import Estimate, Ratios, SiloGeometry
 from siloscope.pose import SiloPose
 from siloscope.sensors import SensorProfile
 
-PARAMETERS = ("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "apex", "offset", "scale", "quadratic")
-"""Order of the fit's parameters: pose; radius; cone (radius per metre of height, z of its vertex); depth bias."""
+PARAMETERS = ("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "apex", "offset", "scale", "quadratic", "oval_cos", "oval_sin")
+"""Order of the fit's parameters: pose; radius; cone (radius per metre of height, z of its vertex); depth bias; ovality."""
 
 DIAMETER_STD = 0.002
 """Standard deviation of a tape-measured diameter, m."""
@@ -28,7 +28,7 @@ GRAVITY_STD = 0.01
 class SurfaceEvidence:
     """What one frame says about all parameters, without priors: what `calibrate` fuses.
 
-    Vectors are (10,) in the order of `PARAMETERS`, matrices (10, 10). Near `parameters` the frame's negative
+    Vectors are (12,) in the order of `PARAMETERS`, matrices (12, 12). Near `parameters` the frame's negative
     log-likelihood is ``gradient @ δ + δ @ information @ δ / 2``. What was known before the frame (sensor profile,
     diameter, gravity) stands beside it, because it is common to all frames.
     """
@@ -224,8 +224,8 @@ def _ratios(counts: Any) -> Ratios | None:
 
 def _sensor(found: dict[str, Any], profile: SensorProfile) -> dict[str, Any]:
     """The depth error that the answer rests on: given, or estimated with the pose."""
-    free = found["free"][7:]
-    std = np.sqrt(np.diag(found["covariance"]))[7:]
+    free = found["free"][7:10]
+    std = np.sqrt(np.diag(found["covariance"]))[7:10]
     names = ("offset", "scale", "quadratic")
     return {
         "profile": profile.name,
@@ -242,6 +242,7 @@ def _quality(found: dict[str, Any]) -> dict[str, Any]:
         "chi_square": found["chi_square"],
         "misfit": found["misfit"],
         "cone_slope": None if found["cone"] is None else found["cone"][0],
+        "ovality": float(np.hypot(*found["ovality"])) if any(found["free"][10:]) else None,
         "seen_from": "inside" if found["inside"] else "outside",
         "arc": evidence["arc"],
         "turn": evidence["turn"],
@@ -264,14 +265,15 @@ def _evidence(
     radius = np.nan if found["radius"] is None else found["radius"]
     free = np.array(found["free"])
     expected = np.full(len(PARAMETERS), np.nan)
-    expected[7:] = profile.bias
+    expected[7:10] = profile.bias
+    expected[10:] = 0.0
     if diameter is not None:
         expected[4] = diameter / 2.0
     if gravity is not None:
         tilt = SiloPose.from_axis(gravity, np.zeros(3))
         expected[:2] = tilt.r_x, tilt.r_y
     return SurfaceEvidence(
-        parameters=np.array([*found["pose"], radius, slope, apex, *found["bias"]]),
+        parameters=np.array([*found["pose"], radius, slope, apex, *found["bias"], *found["ovality"]]),
         information=found["information"],
         gradient=found["gradient"],
         scatter=found["scatter"],

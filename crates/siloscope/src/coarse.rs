@@ -5,10 +5,10 @@ use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, NoiseLaw};
 use crate::start::{Oriented, Start, View, other_part, starts};
-use crate::surface::PlacedSurface;
+use crate::surface::{Part, PlacedSurface};
 use crate::verdict::{WallEvidence, wall_evidence};
 
-/// A cone that rises less than 36° could as well be feed lying at its angle of repose.
+/// A cone that rises less than 36° could as well be feed lying at its angle of repose, unless feed lies in it.
 const FEED_SLOPE: f64 = 1.376;
 
 /// Refines every start value on a few patches; the likeliest that stands up to the evidence is refined on more.
@@ -78,7 +78,7 @@ fn settled(problem: &Problem, mut fit: Fit) -> Result<(Fit, WallEvidence), Refus
         fit = with_other_part(problem, fit);
     }
     problem.refine(&mut fit, 3, 2, 0.15);
-    if fit.surface.cone.is_some_and(|c| c.slope > FEED_SLOPE) {
+    if fit.surface.cone.is_some_and(|c| c.slope > FEED_SLOPE) && !apex_is_covered(problem, &fit) {
         if fit.surface.radius.is_none() {
             return Err(Refusal::ConeMayBeFeed);
         }
@@ -88,6 +88,24 @@ fn settled(problem: &Problem, mut fit: Fit) -> Result<(Fit, WallEvidence), Refus
     let wall = wall_patches(problem, &fit);
     let evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
     judge(&evidence, fit.inside).map(|()| (fit, evidence))
+}
+
+/// Whether something else lies before the cone all around its vertex: then the cone is no surface of feed.
+fn apex_is_covered(problem: &Problem, fit: &Fit) -> bool {
+    let placed = PlacedSurface::new(fit.surface);
+    let reach = 0.3 * fit.surface.size();
+    let (mut near, mut covered) = (0, 0);
+    for patch in &problem.patches.list {
+        let (d, part) = placed.depth(&patch.q);
+        let p = placed.to_silo(&(patch.q * d));
+        if problem.patches.cloud || part != Part::Cone || p.x.hypot(p.y) > reach {
+            continue;
+        }
+        let before = d - fit.bias.true_depth(patch.measured);
+        near += 1;
+        covered += i32::from(before > 0.02 * reach + 4.0 * problem.noise.sigma(d) / patch.count.sqrt());
+    }
+    near >= 5 && covered * 10 >= near * 7
 }
 
 /// What has to hold on a wall of revolution.

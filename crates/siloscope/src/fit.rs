@@ -4,7 +4,7 @@ use crate::Result;
 use crate::Vec3;
 use crate::cloud::cloud_patches;
 use crate::coarse::{coarse_fit, wall_patches};
-use crate::covariance::{scale_uncertainty, widened};
+use crate::covariance::{relief_uncertainty, scale_uncertainty, widened};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{TileEquation, moved, patch_equations, pixel_equations, polish, solve_equations};
 use crate::refine::{Equation, Fit, Prior, Problem, tukey};
@@ -51,6 +51,11 @@ pub struct SurfaceFit {
     pub timing: Vec<(&'static str, f64)>,
 }
 
+/// Misfit, as a share of the radius, from which on the silo may be oval.
+const OVAL_MISFIT: f64 = 1e-3;
+/// Standard deviation of each part of a real silo's ovality.
+const OVALITY_STD: f64 = 0.005;
+
 /// The first passes over the pixels take every fourth pixel of every fourth row.
 const POLISH_STRIDE: usize = 4;
 
@@ -63,7 +68,7 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     }
     patches.unbias_normals(&know.error.bias);
     clock.lap("patches");
-    let (noise, prior, pixel) = (noise(&patches, know), prior(know), pixel_size(image));
+    let (noise, mut prior, pixel) = (noise(&patches, know), prior(know), pixel_size(image));
     let (mut fit, evidence) = coarse_fit(&mut patches, noise, &prior, pixel)?;
     clock.lap("coarse fit");
     if let (Some((radius, _)), true) = (know.radius, prior.bias_std[1] > 0.0) {
@@ -74,6 +79,15 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     for reach in [3.0, 2.0] {
         problem.noise = polish(&problem, image, &mut fit, &wall, (POLISH_STRIDE, reach), know.error.noise);
     }
+    let noise = problem.noise;
+    if fit.misfit > OVAL_MISFIT * fit.surface.size() {
+        prior.ovality_std = OVALITY_STD;
+        for reach in [3.0, 2.0] {
+            let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
+            polish(&problem, image, &mut fit, &wall, (POLISH_STRIDE, reach), Some(noise));
+        }
+    }
+    let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
     let equations = pixel_equations(&problem, image, &fit, &wall, (1, 1.0));
     clock.lap("pixels");
     let mut result = finish(&problem, fit, &equations, evidence).ok_or(Refusal::PoorlyDetermined)?;
@@ -159,7 +173,7 @@ fn prior(know: &Knowledge) -> Prior {
     if know.radius.is_some() && bias_std[1] > 0.0 {
         bias_std[1] = bias_std[1].max(0.05); // a known radius fixes the scale better than any expectation
     }
-    Prior { bias: know.error.bias, bias_std, radius: know.radius, gravity: know.gravity }
+    Prior { bias: know.error.bias, bias_std, radius: know.radius, gravity: know.gravity, ovality_std: 0.0 }
 }
 
 /// Whether the axis is known well enough: its direction, and its position in the middle of the wall that was seen.
@@ -177,7 +191,8 @@ fn finish(problem: &Problem, mut fit: Fit, tiles: &[TileEquation], evidence: Wal
     let equations: Vec<(usize, Equation)> =
         tiles.iter().map(|t| (t.patch, moved(&t.equation, &total, fit.misfit))).collect();
     let (model, free) = system.covariance(&fit)?;
-    let mut covariance = widened(problem, &model, &system, &equations);
+    let mut covariance =
+        widened(problem, &model, &system, &equations) + relief_uncertainty(problem, &fit, tiles, &equations);
     let heights = equations.iter().map(|(_, e)| e.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
     if !is_determined(&covariance, &placed, heights / equations.len().max(1) as f64) {

@@ -46,8 +46,10 @@ pub fn tile_residual(
         return TileResidual::default();
     }
     match part {
-        Part::Cylinder => sums(image, corner, side, bias, sampling, |q| placed.cylinder_depth(q)),
-        Part::Cone => sums(image, corner, side, bias, sampling, |q| placed.cone_depth(q)),
+        Part::Cylinder => {
+            sums(image, corner, side, bias, sampling, |q| placed.rounded(q, placed.cylinder_depth(q), part))
+        }
+        Part::Cone => sums(image, corner, side, bias, sampling, |q| placed.rounded(q, placed.cone_depth(q), part)),
     }
 }
 

@@ -13,8 +13,10 @@ pub struct TileEquation {
     pub patch: usize,
     /// Its equation; the variance is that of the noise alone.
     pub equation: Equation,
-    /// Scatter of the pixels about the tile's mean, metres.
+    /// Scatter of the pixels about the tile's mean, metres along the ray.
     pub scatter: f64,
+    /// Number of its pixels.
+    pub count: f64,
 }
 
 /// One Gauss–Newton step on pixel residuals; returns the noise law, from the residuals themselves where none is known.
@@ -55,7 +57,7 @@ pub fn pixel_equations(
         let seen = tile_residual(image, problem.patches, patch, &placed, &fit.bias, sampling);
         let enough = seen.count * ((stride * stride) as f64) >= 0.5 * count;
         let equation = Equation { residual: seen.mean, variance: single / seen.count, ..equation };
-        enough.then_some(TileEquation { patch, equation, scatter: seen.scatter })
+        enough.then_some(TileEquation { patch, equation, scatter: seen.scatter, count: seen.count })
     };
     (0..wall.len()).filter(|&i| wall[i]).filter_map(tile).collect()
 }
@@ -67,7 +69,12 @@ pub fn patch_equations(problem: &Problem, fit: &Fit, wall: &[bool]) -> Vec<TileE
         let equation = problem.equation(fit, &placed, patch)?;
         let seen = &problem.patches.list[patch];
         let noise = seen.scatter * seen.scatter / seen.count;
-        Some(TileEquation { patch, equation: Equation { variance: noise, ..equation }, scatter: seen.scatter })
+        Some(TileEquation {
+            patch,
+            equation: Equation { variance: noise, ..equation },
+            scatter: seen.scatter,
+            count: seen.count,
+        })
     };
     let mut equations: Vec<TileEquation> = (0..wall.len()).filter(|&i| wall[i]).filter_map(patch).collect();
     let factor = noise_factor(&equations);

@@ -21,6 +21,8 @@ pub struct Prior {
     pub radius: Option<(f64, f64)>,
     /// Direction of gravity in the camera frame and its standard deviation, radians.
     pub gravity: Option<(Vec3, f64)>,
+    /// Standard deviation of the ovality's two parts; zero for a round silo.
+    pub ovality_std: f64,
 }
 
 /// State of the fit.
@@ -55,6 +57,8 @@ pub struct Equation {
     pub part: Part,
     /// Height in the silo frame.
     pub z: f64,
+    /// Azimuth about the axis, radians.
+    pub azimuth: f64,
 }
 
 /// Everything that stays the same during a fit.
@@ -100,10 +104,7 @@ impl Problem<'_> {
             return None;
         }
         let slope = if cloud { 1.0 } else { fit.bias.slope(d) };
-        let mut jacobian = Parameters::zeros();
-        for (k, f) in placed.derivative(&p, &at).into_iter().enumerate() {
-            jacobian[k] = f * slope / along;
-        }
+        let mut jacobian = placed.derivative(&p, &at) * (slope / along);
         if !cloud {
             jacobian[7] = -1.0;
             jacobian[8] = -d;
@@ -121,6 +122,7 @@ impl Problem<'_> {
             angle2: 2.0 * (1.0 - agreement),
             part: at.part,
             z: at.p.z,
+            azimuth: at.p.y.atan2(at.p.x),
         })
     }
 
@@ -219,6 +221,7 @@ impl Fit {
         let factor = radius / now;
         let SiloSurface { pose, cone, .. } = self.surface;
         self.surface = SiloSurface {
+            ovality: self.surface.ovality,
             pose: crate::SiloPose { t_x: pose.t_x * factor, t_y: pose.t_y * factor, ..pose },
             radius: Some(radius),
             cone: cone.map(|c| crate::surface::Cone { apex: c.apex * factor, ..c }),
@@ -250,6 +253,10 @@ impl System {
             if prior.bias_std[k] > 0.0 {
                 system.add_prior(7 + k, now[k] - expected[k], prior.bias_std[k]);
             }
+        }
+        if prior.ovality_std > 0.0 {
+            system.add_prior(10, fit.surface.ovality[0], prior.ovality_std);
+            system.add_prior(11, fit.surface.ovality[1], prior.ovality_std);
         }
         if let (Some((radius, std)), Some(now)) = (prior.radius, fit.surface.radius) {
             system.add_prior(4, now - radius, std);
@@ -340,5 +347,6 @@ impl System {
 pub fn free_parameters(fit: &Fit, prior: &Information) -> [bool; PARAMETERS] {
     let (cylinder, cone) = (fit.surface.radius.is_some(), fit.surface.cone.is_some());
     let known = |k: usize| prior[(k, k)] > 0.0;
-    [true, true, true, true, cylinder, cone, cone, known(7), known(8) && known(4), known(9)]
+    let oval = [known(10), known(11)];
+    [true, true, true, true, cylinder, cone, cone, known(7), known(8) && known(4), known(9), oval[0], oval[1]]
 }

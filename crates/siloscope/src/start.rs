@@ -259,10 +259,12 @@ fn complete(h: &Hypothesis, sample: &[Oriented]) -> Vec<Start> {
     let turn = pose.rotation();
     let local: Vec<Oriented> = sample.iter().map(|o| Oriented { p: pose.to_silo(&o.p), n: turn * o.n, ..*o }).collect();
     let alone = match h.shape {
-        Shape::Cylinder { radius, inside } => (SiloSurface { pose, radius: Some(radius), cone: None }, inside),
+        Shape::Cylinder { radius, inside } => {
+            (SiloSurface { pose, radius: Some(radius), cone: None, ovality: [0.0; 2] }, inside)
+        }
         Shape::Cone { slope } => {
             let apex = pose.to_silo(&h.a).z;
-            (SiloSurface { pose, radius: None, cone: Some(Cone { slope, apex }) }, true)
+            (SiloSurface { pose, radius: None, cone: Some(Cone { slope, apex }), ovality: [0.0; 2] }, true)
         }
     };
     let mut found = vec![alone];
