@@ -262,7 +262,7 @@ DAMAGES = {
     "record": (["frames", 2], 7, "frames[2]"),
     "record's status": (["frames", 2, "status"], "lost", "frames[2].status"),
     "record's index": (["frames", 2, "index"], -1, "frames[2].index"),
-    "evidence": (["evidence", "frames", 1, "information"], [0.0], "55 numbers"),
+    "evidence": (["evidence", "frames", 1, "information"], [0.0], "78 numbers"),
     "evidence's free": (["evidence", "frames", 1, "free"], [1] * 10, "evidence.frames[1].free"),
     "evidence's hole": (["evidence", "frames", 1, "parameters", 0], None, "lacks a value"),
     "sums": (["evidence", "earlier"], [], "evidence.earlier"),

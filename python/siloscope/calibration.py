@@ -93,9 +93,9 @@ class Calibration:
     silo: SiloGeometry = field(default_factory=SiloGeometry)
     silo_std: SiloGeometry = field(default_factory=SiloGeometry)
     parameters: NDArray[np.float64] | None = None
-    """(10,) in the order of `siloscope.surface.PARAMETERS`; NaN where not seen. None for the paper's rule."""
+    """(12,) in the order of `siloscope.surface.PARAMETERS`; NaN where not seen. None for the paper's rule."""
     parameter_covariance: NDArray[np.float64] | None = None
-    """(10, 10) covariance of `parameters`, with zero rows for what is fixed or not seen."""
+    """(12, 12) covariance of `parameters`, with zero rows for what is fixed or not seen."""
     excess: float = 1.0
     """Scatter of the frames' answers over what they state, as a factor of the variance; at least 1."""
     scale_std: float = 0.0

@@ -32,7 +32,7 @@ Matrix = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """Frames added up about `origin` (10,): what is kept of frames whose own evidence is not.
+    """Frames added up about `origin` (12,): what is kept of frames whose own evidence is not.
 
     `information` is Σ w Λ, `pull` Σ w (Λ (θ - origin) - g), `noise` Σ w² N, `shared` Σ w E, `weight` Σ w.
     """
@@ -95,7 +95,7 @@ class Stack:
         return part
 
     def distances(self, centres: Matrix) -> Matrix:
-        """Squared distances (K, N) of the frames' answers from K `centres` (K, 10), each in its own covariance."""
+        """Squared distances (K, N) of the frames' answers from K `centres` (K, 12), each in its own covariance."""
         known = np.isfinite(centres)[:, None, :] & self.seen[None, :, :]
         gaps = np.where(known, self.answers[None, :, :] - centres[:, None, :], 0.0)
         fixed = ~self.free[None, :, SCALE] & known[:, :, SCALE]
@@ -110,7 +110,7 @@ class Stack:
 
 @dataclass(frozen=True, eq=False)
 class Fused:
-    """The frames' common answer: `parameters` (10,), NaN where nobody saw; `covariance` (10, 10), zero there."""
+    """The frames' common answer: `parameters` (12,), NaN where nobody saw; `covariance` (12, 12), zero there."""
 
     parameters: Vector
     covariance: Matrix
@@ -144,7 +144,7 @@ def fuse(stack: Stack, earlier: Sums | None = None) -> Fused:
 
 
 def solve(stack: Stack, weights: Matrix, base: Sums) -> Matrix:
-    """Answers (K, 10) to K weightings (K, N): ``(Σ w Λ + Π)⁻¹ (Σ w (Λ θ - g) + Π μ)``; NaN for what nobody saw."""
+    """Answers (K, 12) to K weightings (K, N): ``(Σ w Λ + Π)⁻¹ (Σ w (Λ θ - g) + Π μ)``; NaN for what nobody saw."""
     system, pull, origin, solved = _systems(stack, weights, base)
     answers = origin + _solve(system, pull[:, :, None])[:, :, 0]
     answers[:, :7][~solved[:, :7]] = np.nan
@@ -152,7 +152,7 @@ def solve(stack: Stack, weights: Matrix, base: Sums) -> Matrix:
 
 
 def majority(stack: Stack, members: NDArray[np.bool_], starts: NDArray[np.intp], base: Sums) -> Matrix:
-    """Least trimmed squares for K groups of frames: the answers (K, 10) about which half of a group lie closest.
+    """Least trimmed squares for K groups of frames: the answers (K, 12) about which half of a group lie closest.
 
     `members` (K, N) are the groups, `starts` (S,) or (K, S) the frames from which the search starts.
     """
@@ -211,7 +211,7 @@ def agreement(deviations: Vector) -> Vector:
 
 
 def prior_of(stack: Stack, weights: Matrix, base: Sums) -> tuple[Vector, Matrix]:
-    """What was known before the frames, once for all of them: information (10,), and mean (K, 10) for K weightings.
+    """What was known before the frames, once for all of them: information (12,), and mean (K, 12) for K weightings.
 
     Frames may state different means where each has its own accelerometer reading.
     """
@@ -237,7 +237,7 @@ def _excess(squared: Vector, dof: NDArray[np.int_]) -> float:
 
 
 def _added(stack: Stack, weights: Matrix, origin: Vector) -> tuple[Matrix, Matrix]:
-    """``Σ w Λ`` (K, 10, 10) and ``Σ w (Λ (θ - origin) - g)`` (K, 10)."""
+    """``Σ w Λ`` (K, 12, 12) and ``Σ w (Λ (θ - origin) - g)`` (K, 12)."""
     gap = np.where(stack.seen, stack.answers - origin, 0.0)
     pulls = np.einsum("nij,nj->ni", stack.information, gap) - stack.gradient
     information = weights @ stack.information.reshape(stack.count, -1)

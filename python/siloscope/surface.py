@@ -14,8 +14,11 @@ from siloscope.estimate import Estimate, Ratios, SiloGeometry
 from siloscope.pose import SiloPose
 from siloscope.sensors import SensorProfile
 
-PARAMETERS = ("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "apex", "offset", "scale", "quadratic", "oval_cos", "oval_sin")
-"""Order of the fit's parameters: pose; radius; cone (radius per metre of height, z of its vertex); depth bias; ovality."""
+PARAMETERS = (
+    *("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "apex"),
+    *("offset", "scale", "quadratic", "oval_cos", "oval_sin"),
+)
+"""Order of the parameters: pose; radius; cone (radius per metre of height, z of its vertex); depth bias; ovality."""
 
 DIAMETER_STD = 0.002
 """Standard deviation of a tape-measured diameter, m."""

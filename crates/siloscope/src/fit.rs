@@ -90,7 +90,8 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
     let equations = pixel_equations(&problem, image, &fit, &wall, (1, 1.0));
     clock.lap("pixels");
-    let mut result = finish(&problem, fit, &equations, evidence).ok_or(Refusal::PoorlyDetermined)?;
+    let mut result =
+        finish(&problem, fit, &equations, evidence, know.error.noise.is_some()).ok_or(Refusal::PoorlyDetermined)?;
     clock.lap("covariance");
     result.timing = clock.laps;
     result.patches = patches;
@@ -146,7 +147,7 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
     clock.lap("coarse fit");
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
     let equations = patch_equations(&problem, &fit, &wall_patches(&problem, &fit));
-    let Some(mut result) = finish(&problem, fit, &equations, evidence) else {
+    let Some(mut result) = finish(&problem, fit, &equations, evidence, false) else {
         return Ok(Err(Refusal::PoorlyDetermined));
     };
     clock.lap("covariance");
@@ -186,13 +187,21 @@ fn is_determined(covariance: &Information, placed: &PlacedSurface, height: f64) 
 }
 
 /// Last solution, covariance and residuals.
-fn finish(problem: &Problem, mut fit: Fit, tiles: &[TileEquation], evidence: WallEvidence) -> Option<SurfaceFit> {
+fn finish(
+    problem: &Problem,
+    mut fit: Fit,
+    tiles: &[TileEquation],
+    evidence: WallEvidence,
+    noise_is_known: bool,
+) -> Option<SurfaceFit> {
     let (system, total) = solve_equations(problem, &mut fit, tiles)?;
     let equations: Vec<(usize, Equation)> =
         tiles.iter().map(|t| (t.patch, moved(&t.equation, &total, fit.misfit))).collect();
     let (model, free) = system.covariance(&fit)?;
-    let mut covariance =
-        widened(problem, &model, &system, &equations) + relief_uncertainty(problem, &fit, tiles, &equations);
+    let mut covariance = widened(problem, &model, &system, &equations);
+    if noise_is_known {
+        covariance += relief_uncertainty(problem, &fit, tiles, &equations);
+    }
     let heights = equations.iter().map(|(_, e)| e.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
     if !is_determined(&covariance, &placed, heights / equations.len().max(1) as f64) {
