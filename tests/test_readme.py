@@ -1,4 +1,5 @@
-"""README.md is run: its Python and its siloscope commands work as printed, its JSON has the keys of a real answer."""
+"""README.md and the pages of docs/ are run: their Python and their commands work as printed, the JSON shown has the keys
+of a real answer."""
 
 from __future__ import annotations
 
@@ -15,10 +16,12 @@ from siloscope.demo import SCENE, write_frame
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text("utf-8")
+PAGES = ("README.md", "docs/index.md", "docs/your-frame.md", "docs/api.md")
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"^```{language}\n(.*?)^```$", README, re.DOTALL | re.MULTILINE)
+def blocks(language: str, *pages: str) -> list[str]:
+    text = "\n".join((ROOT / page).read_text("utf-8") for page in pages or ("README.md",))
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, re.DOTALL | re.MULTILINE)
 
 
 @pytest.fixture(scope="module")
@@ -26,11 +29,13 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A directory as `make demo` leaves it."""
     directory = tmp_path_factory.mktemp("readme")
     (directory / "demo").mkdir()
-    write_frame(SCENE.render(), directory / "demo")
+    seen = SCENE.render()
+    write_frame(seen, directory / "demo")
+    write_frame(seen, directory)
     return directory
 
 
-@pytest.mark.parametrize("line", [line for block in blocks("bash") for line in block.splitlines()])
+@pytest.mark.parametrize("line", [line for block in blocks("bash", *PAGES) for line in block.splitlines()])
 def test_commands_work(line: str, place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     words = shlex.split(line, comments=True)
     monkeypatch.chdir(place)
@@ -42,7 +47,7 @@ def test_commands_work(line: str, place: Path, monkeypatch: pytest.MonkeyPatch) 
         assert words == [".", ".venv/bin/activate"]
 
 
-@pytest.mark.parametrize("code", blocks("python"))
+@pytest.mark.parametrize("code", blocks("python", *PAGES))
 def test_python_works(
     code: str, place: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

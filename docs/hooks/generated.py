@@ -17,6 +17,11 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     return _PLACE.sub(lambda found: _PARTS[found[1]](), markdown)
 
 
+def on_page_content(html: str, **_: Any) -> str:
+    """Called by mkdocs with each page's HTML: links that lead from the repository's root into docs/ stay in docs/."""
+    return re.sub(r'href="docs/([^"]+?)\.md"', r'href="\1.html"', html)
+
+
 def commands() -> str:
     """The help text of every command."""
     from siloscope.cli import COMMANDS
