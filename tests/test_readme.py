@@ -1,5 +1,4 @@
-"""README.md and the pages of docs/ are run: their Python and their commands work as printed, the JSON shown has the keys
-of a real answer."""
+"""README.md and the pages of docs/ are run: Python and commands work as printed, JSON has the keys of a real answer."""
 
 from __future__ import annotations
 
