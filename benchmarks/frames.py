@@ -1,6 +1,6 @@
 """Processor time to read one frame: PNG beside Pillow, and the other formats, in milliseconds.
 
-    python benchmarks/frames.py
+python benchmarks/frames.py
 """
 
 from __future__ import annotations

@@ -12,6 +12,7 @@ import io
 import statistics
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -43,6 +44,7 @@ def main() -> None:
         console.print(step_times(frames, method, sensor, repeat))
     console.print(scaling(repeat))
     console.print(start_up(repeat))
+    console.print(memory(frames))
 
 
 def milliseconds(run: Callable[[], object], repeat: int) -> float:
@@ -128,6 +130,35 @@ def start_up(repeat: int) -> Table:
         command = [sys.executable, *what]
         taken = milliseconds(lambda: subprocess.run(command, capture_output=True, check=True), repeat)  # noqa: B023
         table.add_row("python " + " ".join(what), f"{taken:.0f}")
+    return table
+
+
+PEAK = """
+import re, sys
+def peak():
+    return int(re.search(r"VmHWM:\\s+(\\d+)", open("/proc/self/status").read())[1])
+start = peak()
+import numpy as np, siloscope
+held = np.load(sys.argv[1])
+camera = siloscope.Camera(**eval(sys.argv[2]))
+siloscope.locate(held, camera, method=sys.argv[3])
+print((peak() - start) / 1024)
+"""
+"""Run in a process of its own, on Linux."""
+
+
+def memory(frames: Sequence[SimulatedFrame]) -> Table:
+    """Peak memory of one `locate` above the interpreter's start, imports and frame included."""
+    table = Table(title="peak memory above the interpreter's start (MB)", title_justify="left")
+    table.add_column("method")
+    table.add_column(SCENARIOS[0], justify="right")
+    with tempfile.TemporaryDirectory() as folder:
+        path = f"{folder}/frame.npy"
+        np.save(path, frames[0].measured)
+        for method, _ in METHODS:
+            command = [sys.executable, "-c", PEAK, path, repr(frames[0].camera.to_dict()), method]
+            done = subprocess.run(command, capture_output=True, check=True, text=True)
+            table.add_row(method, f"{float(done.stdout):.0f}")
     return table
 
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import io
 import json
+import os
 import subprocess
 import sys
+import warnings
 
 import pytest
 
@@ -108,7 +111,22 @@ def test_module_runs_like_the_command() -> None:
     assert (done.returncode, done.stdout) == (0, f"siloscope {__version__}\n")
 
 
-def test_closed_pipe_is_quiet() -> None:
-    script = f"set -o pipefail; {sys.executable} -m siloscope --help | true"
-    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True)
-    assert done.stderr == ""
+def test_closed_pipe_is_quiet(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    def write_to_nobody() -> None:
+        raise BrokenPipeError(32, "Broken pipe")
+
+    monkeypatch.setattr(sys, "stdout", io.StringIO())
+    assert outcome.guarded(write_to_nobody, ["--json"]) == outcome.BROKEN_PIPE
+    assert capsys.readouterr().err == ""
+    script = f"{sys.executable} -m siloscope --help | head -c 1 > /dev/null"
+    assert subprocess.run(["bash", "-c", script], capture_output=True, text=True).stderr == ""
+
+
+def test_output_survives_a_terminal_without_its_letters() -> None:
+    done = run("locate", "--help", env={**os.environ, "PYTHONIOENCODING": "ascii", "NO_COLOR": "1"})
+    assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_warnings_are_one_line_without_source(capsys: pytest.CaptureFixture[str]) -> None:
+    assert outcome.guarded(lambda: warnings.warn("the frame is dark", stacklevel=1), []) == 0
+    assert capsys.readouterr().err == "warning: the frame is dark\n"
