@@ -30,6 +30,7 @@ _MODULES = (
     "rosbag1",
     "mcap",
     "sqlite_bag",
+    "archive",
     "ros2_folder",
     "mkv",
     "e57",

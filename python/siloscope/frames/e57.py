@@ -6,13 +6,14 @@ import math
 import struct
 import xml.etree.ElementTree as Xml
 from collections.abc import Iterator
-from functools import cache, partial
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope import _core
 from siloscope.errors import InputError
 from siloscope.frame import Frame
 from siloscope.frames.source import Format, FrameSource, Item, Options
@@ -54,14 +55,12 @@ class PagedFile:
 
     def _checked(self, first: int, last: int, start: int) -> bytes:
         count = min(_BATCH_PAGES, last + 1 - start)
-        rows = np.frombuffer(self.file.read(count * self.page), np.uint8).reshape(count, self.page)
-        stored = np.ascontiguousarray(rows[:, -4:]).view(">u4")[:, 0]
-        wrong = np.nonzero(_crc32c(rows[:, :-4]) != stored)[0]
-        if wrong.size:
-            raise InputError(
-                f"{self.name}: page {start + int(wrong[0])} fails its checksum; the file is damaged, export it again"
-            )
-        return rows[:, :-4].tobytes()
+        pages = memoryview(self.file.read(count * self.page))
+        parts = [pages[i * self.page : (i + 1) * self.page] for i in range(count)]
+        for number, part in enumerate(parts, start):
+            if _core.checksum(bytes(part[:-4])) != int.from_bytes(part[-4:], "big"):
+                raise InputError(f"{self.name}: page {number} fails its checksum; the file is damaged, export it again")
+        return b"".join(part[:-4] for part in parts)
 
     def xml(self) -> Xml.Element:
         """The description."""
@@ -72,23 +71,6 @@ class PagedFile:
             return Xml.fromstring(text)
         except (Xml.ParseError, ValueError, LookupError) as error:
             raise InputError(f"{self.name}: damaged description ({error}); export the file again") from None
-
-
-@cache
-def _crc_table() -> NDArray[np.uint32]:
-    table = np.arange(256, dtype=np.uint32)
-    for _ in range(8):
-        table = np.where(table & 1, (table >> 1) ^ np.uint32(0x82F63B78), table >> 1)
-    return table
-
-
-def _crc32c(rows: NDArray[np.uint8]) -> NDArray[np.uint32]:
-    """CRC-32C of every row."""
-    table = _crc_table()
-    crc = np.full(len(rows), 0xFFFFFFFF, np.uint32)
-    for column in np.ascontiguousarray(rows.T):
-        crc = table[(crc ^ column) & 0xFF] ^ (crc >> 8)
-    return ~crc
 
 
 class Column(NamedTuple):

@@ -1,5 +1,6 @@
 //! Decoders of file contents that would be slow in Python, or less safe in C.
 
+mod checksum;
 mod lzf;
 mod png;
 mod tiff;
@@ -10,5 +11,6 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(png::decode_png16, m)?)?;
     m.add_function(wrap_pyfunction!(lzf::decompress_lzf, m)?)?;
     m.add_function(wrap_pyfunction!(tiff::tiff_pages, m)?)?;
-    m.add_function(wrap_pyfunction!(tiff::decode_tiff, m)?)
+    m.add_function(wrap_pyfunction!(tiff::decode_tiff, m)?)?;
+    m.add_function(wrap_pyfunction!(checksum::checksum, m)?)
 }
