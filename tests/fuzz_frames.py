@@ -29,6 +29,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parent))
 
 import frame_files
+import recording_files
 import siloscope.frames
 from siloscope import InputError, camera_files
 
@@ -53,9 +54,10 @@ _SHORT = {"points.xyz": 200, "points.csv": 200, "image.csv": 12}
 SEEDS: dict[str, Callable[[], bytes]] = {
     **frame_files.MAKERS,
     **{name: _first_lines(name, count) for name, count in _SHORT.items()},
+    **recording_files.MAKERS,
     **{f"camera{suffix}": _camera_file(suffix) for suffix in (".json", ".toml", ".yaml")},
 }
-"""Good files by name, the text tables short; formats with makers of their own add them here."""
+"""Good files by name, the text tables short."""
 
 LONGEST_S = 2.0
 """Of the processor's time, which a busy machine does not stretch."""
@@ -130,9 +132,9 @@ _CHANGES = (_flip, _overwrite, _cut, _remove, _repeat, _insert, _number)
 
 
 def _with_checksums(data: bytes) -> bytes:
-    """PNG chunks with their checksums made right again, so that the damage reaches what is behind them."""
+    """Checksums made right again, so that the damage reaches what is behind them."""
     if not data.startswith(b"\x89PNG\r\n\x1a\n"):
-        return data
+        return recording_files.with_checksums(data)
     out, at = bytearray(data), 8
     while at + 12 <= len(data):
         (length,) = struct.unpack(">I", data[at : at + 4])

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import realdata
+import recording_files
 import siloscope.frames
 from siloscope import Camera, Frame, InputError
 
@@ -66,15 +67,22 @@ def test_a_cut_las_file_is_refused(tmp_path: Path, name: str, share: float) -> N
         list(siloscope.frames.open(cut))
 
 
-@pytest.mark.parametrize(("library", "head", "extra"), [("laspy", b"LASF", "las"), ("OpenEXR", b"v/1\x01", "exr")])
-def test_a_missing_library_names_its_extra(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, library: str, head: bytes, extra: str
-) -> None:
-    monkeypatch.setitem(sys.modules, library, None)
-    path = tmp_path / "file"
-    path.write_bytes(head + bytes(400))
-    with pytest.raises(InputError, match=rf"extra '{extra}': pip install 'siloscope\[{extra}\]'"):
+def test_a_missing_library_names_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "lazrs", None)
+    path = tmp_path / "cloud.laz"
+    path.write_bytes(recording_files.las(compressed=True))
+    with pytest.raises(InputError, match=r"extra 'las': pip install 'siloscope\[las\]'"):
         siloscope.frames.open(path)
+
+
+@pytest.mark.parametrize("version", ["1.2", "1.4"])
+def test_las_of_either_count_field(tmp_path: Path, version: str) -> None:
+    laspy = pytest.importorskip("laspy")
+    cloud = laspy.create(point_format=6 if version == "1.4" else 0, file_version=version)
+    cloud.header.scales, cloud.header.offsets = np.array([0.001, 0.01, 0.1]), np.array([1e6, -2e6, 0])
+    cloud.x, cloud.y, cloud.z = np.random.default_rng(1).uniform(-5, 5, (3, 60_000)) + np.array([[1e6], [-2e6], [0]])
+    cloud.write(tmp_path / "cloud.las")
+    np.testing.assert_array_equal(only_frame(tmp_path / "cloud.las").points, np.asarray(cloud.xyz))
 
 
 # --- E57
@@ -157,7 +165,7 @@ def test_a_flipped_bit_among_the_points_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("dtype", [np.float32, np.float16])
-@pytest.mark.parametrize("channel", ["Z", "Depth.Z", "View.distance", "V"])
+@pytest.mark.parametrize("channel", ["Z", "Depth.Z", "View.distance", "RenderLayer.Depth.V", "V"])
 def test_exr_depth_with_and_without_layer(tmp_path: Path, channel: str, dtype: Any) -> None:
     exr = pytest.importorskip("OpenEXR")
     depth = np.random.default_rng(1).uniform(1, 6, (48, 64)).astype(dtype)
@@ -169,6 +177,35 @@ def test_exr_depth_with_and_without_layer(tmp_path: Path, channel: str, dtype: A
     expected = np.where(np.isinf(depth), 0, depth.astype(np.float32))
     np.testing.assert_array_equal(frame.depth, expected)
     assert frame.depth_unit is None
+
+
+@pytest.mark.parametrize("compression", ["NO", "RLE", "ZIPS", "ZIP", "PIZ"])
+def test_exr_lossless_compressions(tmp_path: Path, compression: str) -> None:
+    exr = pytest.importorskip("OpenEXR")
+    depth = np.random.default_rng(2).uniform(1, 6, (48, 64)).astype(np.float32)
+    path = tmp_path / "depth.exr"
+    exr.File({"compression": getattr(exr, f"{compression}_COMPRESSION")}, {"Z": depth}).write(str(path))
+    np.testing.assert_array_equal(only_frame(path).depth, depth)
+
+
+def test_exr_with_several_parts(tmp_path: Path) -> None:
+    exr = pytest.importorskip("OpenEXR")
+    depth = np.random.default_rng(2).uniform(1, 6, (48, 64)).astype(np.float32)
+    colour = exr.Part({}, {"R": np.zeros((48, 64), np.float32)}, "beauty")
+    path = tmp_path / "parts.exr"
+    exr.File([colour, exr.Part({}, {"Z": depth}, "depth")]).write(str(path))
+    np.testing.assert_array_equal(only_frame(path).depth, depth)
+
+
+@pytest.mark.parametrize("compression", ["DWAA", "B44", "PXR24"])
+def test_exr_lossy_compressions_are_read_as_openexr_reads_them(tmp_path: Path, compression: str) -> None:
+    exr = pytest.importorskip("OpenEXR")
+    path = tmp_path / "lossy.exr"
+    smooth = np.add.outer(np.linspace(2, 3, 48), np.linspace(0, 1, 64)).astype(np.float16)
+    exr.File({"compression": getattr(exr, f"{compression}_COMPRESSION")}, {"Y": smooth}).write(str(path))
+    with exr.File(str(path), separate_channels=True) as file:
+        expected = np.array(file.channels()["Y"].pixels)
+    np.testing.assert_allclose(only_frame(path).depth, expected, rtol=2e-3)
 
 
 def test_exr_ray_length_becomes_z(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""OpenEXR depth images of renderers, by `OpenEXR` (extra ``exr``).
+"""OpenEXR depth images of renderers.
 
 Some renderers store the length of the ray, not z; nothing in the file tells, `ray_length` says it.
 """
@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from siloscope import _core
 from siloscope.errors import InputError
 from siloscope.frame import Frame
-from siloscope.frames.extras import need
+from siloscope.frames.beside import take_camera_beside
 from siloscope.frames.source import Format, FrameSource, Item, Options, check_image_size
 
 MAGIC = b"\x76\x2f\x31\x01"
@@ -24,23 +24,34 @@ _BACKGROUND = 1e9
 """Renderers write such distances, or infinity, where the ray meets nothing."""
 
 
-def depth_channel(name: str, channels: list[str], wanted: str | None) -> str:
+class Channel(NamedTuple):
+    """One channel of one part of the file."""
+
+    part: int
+    name: str
+    size: tuple[int, int]
+    """Width and height."""
+
+
+def depth_channel(name: str, channels: list[Channel], wanted: str | None) -> Channel:
     """The channel that holds depth; raises `InputError` where nothing tells, naming the channels."""
+    listed = ", ".join(dict.fromkeys(channel.name for channel in channels)) or "none"
     if wanted is not None:
-        fitting = [channel for channel in channels if channel == wanted] or [c for c in channels if wanted in c]
+        fitting = [channel for channel in channels if channel.name == wanted]
+        fitting = fitting or [channel for channel in channels if wanted in channel.name]
         if len(fitting) == 1:
             return fitting[0]
-        raise InputError(f"{name}: {len(fitting)} channels named '{wanted}'; there are {', '.join(channels)}")
+        raise InputError(f"{name}: {len(fitting)} channels named '{wanted}'; there are {listed}")
     if len(channels) == 1:
         return channels[0]
     for ending in _NAMES:
-        fitting = [channel for channel in channels if channel.rsplit(".", 1)[-1].lower() == ending]
+        fitting = [channel for channel in channels if channel.name.rsplit(".", 1)[-1].lower() == ending]
         if len(fitting) == 1:
             return fitting[0]
-    layers = [c for c in channels if "depth" in c.lower() or "dist" in c.lower()]
-    if len(layers) == 1:
-        return layers[0]
-    raise InputError(f"{name}: which channel is depth? choose with --stream: {', '.join(channels)}")
+    fitting = [channel for channel in channels if "depth" in channel.name.lower()]
+    if len(fitting) == 1:
+        return fitting[0]
+    raise InputError(f"{name}: which channel is depth? choose with --stream: {listed}")
 
 
 class ExrSource(FrameSource):
@@ -48,50 +59,39 @@ class ExrSource(FrameSource):
 
     def __init__(self, path: Path, options: Options) -> None:
         super().__init__(path, "exr", options)
-        self.exr = need("OpenEXR", "exr", f"{path}: reading EXR")
-        header, self.channels = self._header()
-        low, high = header["dataWindow"]
-        self.size = int(high[0]) - int(low[0]) + 1, int(high[1]) - int(low[1]) + 1
-        check_image_size(self.name, *self.size)
+        self.channels = self._read_channels()
         self.channel = depth_channel(self.name, self.channels, options.stream)
-        self.provenance["stream"] = self.channel
+        check_image_size(self.name, *self.channel.size)
+        self.provenance["stream"] = self.channel.name
+        take_camera_beside(self, self.channel.size)
 
-    def _header(self) -> tuple[dict[str, Any], list[str]]:
+    def _read_channels(self) -> list[Channel]:
         try:
-            with self.exr.File(str(self.path), separate_channels=True, header_only=True) as file:
-                header = dict(file.header())
-                return header, [channel.name for channel in header["channels"]]
-        except Exception as error:
+            parts = _core.exr_parts(self.path)
+        except ValueError as error:
             raise self._damaged(error) from None
+        return [Channel(i, name, (width, height)) for i, (width, height, names) in enumerate(parts) for name in names]
 
     def _items(self) -> Iterator[Item]:
         yield Item(self.path.name, self._decode)
 
     def _decode(self) -> Frame:
+        width, height = self.channel.size
         try:
-            with self.exr.File(str(self.path), separate_channels=True) as file:
-                pixels: NDArray[Any] = np.array(file.channels()[self.channel].pixels)
-        except Exception as error:
+            depth = _core.decode_exr(self.path, self.channel.part, self.channel.name).reshape(height, width)
+        except ValueError as error:
             raise self._damaged(error) from None
-        if pixels.ndim != 2 or pixels.dtype.kind != "f":
-            raise InputError(
-                f"{self.name}: channel {self.channel} is {pixels.dtype} of shape {pixels.shape}, not depth"
-            )
-        depth = pixels.astype(np.float32)
         return Frame(depth=np.where(depth < _BACKGROUND, depth, np.float32(0)))
 
-    def _damaged(self, error: Exception) -> InputError:
-        cause = str(error).splitlines()[0] if str(error) else type(error).__name__
-        return InputError(f"{self.name}: damaged EXR file ({cause}); render it again")
+    def _damaged(self, error: ValueError) -> InputError:
+        return InputError(f"{self.name}: damaged EXR, or a compression not read ({error}); save it with ZIP")
 
     def _count(self) -> int:
         return 1
 
     def _streams(self) -> list[dict[str, Any]]:
-        return [
-            {"name": name, "kind": "depth", "size": self.size, "frames": 1, "chosen": name == self.channel}
-            for name in self.channels
-        ]
+        stream = {"kind": "depth", "frames": 1}
+        return [{**stream, "name": c.name, "size": c.size, "chosen": c is self.channel} for c in self.channels]
 
 
-FORMAT = Format("exr", lambda head, path: head.startswith(MAGIC), ExrSource, extra="exr")
+FORMAT = Format("exr", lambda head, path: head.startswith(MAGIC), ExrSource)

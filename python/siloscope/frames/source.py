@@ -231,7 +231,8 @@ class FrameSource(ABC):
         if not self.problems:
             return InputError(f"{self.name}: no frames in it; `siloscope info` shows what is")
         if len(self.problems) == 1:
-            return InputError(self.problems[0])
+            (problem,) = self.problems
+            return InputError(problem if self.name in problem else f"{self.name}, {problem}")
         return InputError(
             f"{self.name}: none of {len(self.problems)} frames can be read; the first: {self.problems[0]}"
         )

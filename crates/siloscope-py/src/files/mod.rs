@@ -1,6 +1,7 @@
 //! Decoders of file contents that would be slow in Python, or less safe in C.
 
 mod checksum;
+mod exr;
 mod lzf;
 mod png;
 mod tiff;
@@ -12,5 +13,7 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(lzf::decompress_lzf, m)?)?;
     m.add_function(wrap_pyfunction!(tiff::tiff_pages, m)?)?;
     m.add_function(wrap_pyfunction!(tiff::decode_tiff, m)?)?;
-    m.add_function(wrap_pyfunction!(checksum::checksum, m)?)
+    m.add_function(wrap_pyfunction!(checksum::checksum, m)?)?;
+    m.add_function(wrap_pyfunction!(exr::exr_parts, m)?)?;
+    m.add_function(wrap_pyfunction!(exr::decode_exr, m)?)
 }
