@@ -13,6 +13,8 @@ _TOLERANCE = 1.0
 """How far, in m/s², the mean may be from standard gravity: bias and scale of small accelerometers."""
 _SHAKE = 1.0
 """Standard deviation of a sample, in m/s², above which the camera was being moved."""
+_FASTEST = 1e4
+"""Larger numbers, and NaN, are no accelerations."""
 _SAMPLES = 500
 
 
@@ -32,7 +34,7 @@ def at_rest(samples: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, s
 
     An accelerometer at rest measures minus gravity.
     """
-    samples = samples[np.all(np.isfinite(samples), axis=1)]
+    samples = samples[np.all(np.abs(samples) < _FASTEST, axis=1)]
     if not len(samples):
         return None, "the accelerometer's stream is empty"
     mean = samples.mean(axis=0)

@@ -265,8 +265,8 @@ def _read_transform(wire: Wire) -> Transform:
 
 def rotation_of(quaternion: NDArray[np.float64]) -> NDArray[np.float64]:
     """Rotation matrix (3, 3) of a quaternion x, y, z, w of any length but 0."""
-    norm = float(np.linalg.norm(quaternion))
-    if not (math.isfinite(norm) and norm > 0):
+    norm = math.hypot(*quaternion.tolist())
+    if not 1e-3 < norm < 1e3:
         raise InputError("a transform's rotation is no quaternion")
     x, y, z, w = quaternion / norm
     return np.array(

@@ -37,6 +37,7 @@ class SqliteBag(Recording):
         # Read-only still reads a write-ahead log; where the folder forbids that, the file alone has to do.
         for mode in ("mode=ro", "mode=ro&immutable=1"):
             base = sqlite3.connect(f"file:{quote(str(path.resolve()))}?{mode}", uri=True, check_same_thread=False)
+            base.text_factory = _text
             try:
                 tables = {name for (name,) in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
                 break
@@ -74,6 +75,10 @@ class SqliteBag(Recording):
     def close(self) -> None:
         """Lets go of the file."""
         self.base.close()
+
+
+def _text(data: bytes) -> str:
+    return data.decode("utf-8", "replace")
 
 
 def _open(path: Path, options: Options) -> RecordedSource:

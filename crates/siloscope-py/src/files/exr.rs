@@ -2,8 +2,8 @@
 
 use super::png::BEST_DEFLATE_RATIO;
 use crate::convert::value_error;
-use exr::image::read::read;
 use exr::image::read::layers::ReadChannels;
+use exr::image::read::read;
 use exr::meta::MetaData;
 use exr::meta::header::Header;
 use exr::prelude::{FlatSamples, ReadLayers};
