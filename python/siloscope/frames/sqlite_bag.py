@@ -14,6 +14,8 @@ from siloscope.frames.source import Format, Options
 from siloscope.frames.wire import Wire
 
 MAGIC = b"SQLite format 3\0"
+_ERRORS = (sqlite3.Error, UnicodeError)
+"""What damage raises; in the text of an error the bytes need not be text."""
 
 
 class SqliteBag(Recording):
@@ -25,7 +27,7 @@ class SqliteBag(Recording):
         self.base = self._connect(path)
         try:
             self._index()
-        except sqlite3.Error as error:
+        except _ERRORS as error:
             self.damage = f"{self.name}: the recording is cut off or damaged ({error}); frames before are read"
         except BaseException:
             self.base.close()
@@ -41,9 +43,9 @@ class SqliteBag(Recording):
             try:
                 tables = {name for (name,) in base.execute("SELECT name FROM sqlite_master WHERE type = 'table'")}
                 break
-            except sqlite3.Error as error:
+            except _ERRORS as error:
                 base.close()
-                problem = error
+                problem = str(error)
         else:
             raise InputError(f"{path}: damaged SQLite file ({problem}); record again") from None
         base.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, max(1_000_000, min(self.size, MAX_CHUNK)))
@@ -65,7 +67,7 @@ class SqliteBag(Recording):
         """One message."""
         try:
             row = self.base.execute("SELECT data FROM messages WHERE id = ?", (entry.where,)).fetchone()
-        except sqlite3.Error as error:
+        except _ERRORS as error:
             raise InputError(f"the recording is cut off or damaged ({error})") from None
         data = row[0] if row else b""
         if not isinstance(data, bytes):
