@@ -68,6 +68,12 @@ def test_nothing_readable_is_an_error(png: Path) -> None:
         list(siloscope.frames.open(png, depth_unit=0.001))
 
 
+def test_a_stream_that_is_not_there_is_wrong_usage(png: Path) -> None:
+    assert len(siloscope.frames.open(png, stream="depth")) == 1
+    with pytest.raises(UsageError, match="has the stream 'depth', none named 'colour'"):
+        siloscope.frames.open(png, stream="colour")
+
+
 @pytest.mark.parametrize("unit", [0.0, -1.0, float("nan"), float("inf"), 1000.0])
 def test_impossible_units_are_refused(png: Path, unit: float) -> None:
     with pytest.raises(UsageError, match="depth unit"):

@@ -105,10 +105,20 @@ def sniff(path: StrPath) -> Format:
 
 def _open_one(path: Path, options: Options) -> FrameSource:
     try:
-        return sniff(path).open(path, options)
+        source = sniff(path).open(path, options)
+        _check_stream(source, options.stream)
+        return source
     except OSError as error:
         cause = error.strerror or str(error)
         raise InputError(f"{path}: can't be read ({cause}); check the path and its permissions") from None
+
+
+def _check_stream(source: FrameSource, wanted: str | None) -> None:
+    """Formats with one stream don't look for the one that the user names."""
+    names = [str(stream.get("name")) for stream in source._streams() if stream.get("chosen")] if wanted else []
+    if wanted and names and not any(wanted in name for name in names):
+        source.close()
+        raise UsageError(f"{source.name}: has the stream '{names[0]}', none named '{wanted}'; leave --stream out")
 
 
 def _open_or_tell(path: Path, options: Options) -> FrameSource:

@@ -106,6 +106,9 @@ class NpzSource(ArraySource):
             size = self.archive.getinfo(f"{name}.npy").file_size
             return stored_array(file, f"{self.name}: {name}", size, text=text).whole()
 
+    def _streams(self) -> list[dict[str, Any]]:
+        return [{**stream, "name": self.provenance["array"]} for stream in super()._streams()]
+
     def close(self) -> None:
         super().close()
         self.archive.close()
