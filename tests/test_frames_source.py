@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 import siloscope.frames
-from siloscope import Camera, InputError, UsageError
+from siloscope import Camera, InputError, UsageError, writers
 
 RAW = np.random.default_rng(1).integers(400, 6000, (48, 64), dtype=np.uint16)
 CAMERA = Camera(64, 48, 57.0, 57.0, 31.5, 23.5)
@@ -123,6 +123,29 @@ def test_float_depth_that_looks_like_millimetres_is_not_taken_for_metres(tmp_pat
         list(siloscope.frames.open(tmp_path / "mm.npy"))
     (frame,) = siloscope.frames.open(tmp_path / "mm.npy", depth_unit=0.001)
     assert np.allclose(frame.depth, RAW * 0.001)
+
+
+def test_a_unit_that_puts_the_wall_at_kilometres_is_refused(png: Path) -> None:
+    with pytest.raises(InputError, match="puts the median depth at"):
+        list(siloscope.frames.open(png, depth_unit=1))
+
+
+@pytest.mark.parametrize("name", ["mm.npy", "mm.ply", "mm.xyz"])
+def test_points_in_millimetres_are_not_taken_for_metres(tmp_path: Path, name: str) -> None:
+    points = np.random.default_rng(2).uniform(-1500.5, 1500.5, (500, 3)).astype(np.float32)
+    path = tmp_path / name
+    if name.endswith("npy"):
+        np.save(path, points)
+    elif name.endswith("ply"):
+        writers.write_ply(path, points)
+    else:
+        np.savetxt(path, points)
+    with pytest.raises(InputError, match=r"0\.001 for millimetres"):
+        list(siloscope.frames.open(path))
+    (frame,) = siloscope.frames.open(path, depth_unit=0.001)
+    assert np.allclose(frame.points, points * 0.001)
+    (frame,) = siloscope.frames.open(path, depth_unit=1)
+    assert np.allclose(frame.points, points)
 
 
 def test_ray_length_becomes_z(tmp_path: Path) -> None:

@@ -15,7 +15,8 @@ from pathlib import Path
 from siloscope.camera import Camera
 from siloscope.errors import InputError, UsageError
 from siloscope.frame import Frame
-from siloscope.frames.source import HEAD_BYTES, Chain, Format, FrameSource, Item, Options, Unreadable
+from siloscope.frames.chain import Chain, Unreadable
+from siloscope.frames.source import HEAD_BYTES, Format, FrameSource, Item, Options
 
 __all__ = ["Format", "Frame", "FrameSource", "Item", "Options", "formats", "open", "sniff"]
 

@@ -18,6 +18,11 @@ if TYPE_CHECKING:
 FARTHEST_M = 100.0
 """Median depth above which floating-point "metres" are taken for some other unit."""
 
+WIDEST_M = 200.0
+"""Extent above which points of a format that has no units are taken for some other unit than metres."""
+
+_UNITLESS_CLOUDS = ("ply", "pcd", "xyz", "npy", "npz", "folder")
+
 
 class UnknownUnit(InputError):
     """The depth's unit is not known: concerns every frame of the source, so iterating ends."""
@@ -34,9 +39,10 @@ def _with_unit(frame: Frame, options: Options) -> Frame:
     given = options.depth_unit
     if given is not None:
         frame = _with_origin(frame, depth_unit=given, depth_unit_from="given")
+    if frame.points is not None:
+        return _with_metric_points(frame, given)
     if frame.depth is None:
-        points = frame.points if given is None or frame.points is None else frame.points * given
-        return replace(frame, points=points, depth_unit=None)
+        return frame
     if np.issubdtype(frame.depth.dtype, np.floating):
         return _with_metres(frame, given)
     if given is None and options.camera_depth_unit is not None:
@@ -47,6 +53,26 @@ def _with_unit(frame: Frame, options: Options) -> Frame:
 
 def _with_origin(frame: Frame, **known: Any) -> Frame:
     return replace(frame, provenance={**frame.provenance, **known})
+
+
+def _with_metric_points(frame: Frame, given: float | None) -> Frame:
+    points = frame.points
+    assert points is not None
+    if given is not None:
+        return replace(frame, points=points * points.dtype.type(given), depth_unit=None)
+    if frame.provenance.get("format") in _UNITLESS_CLOUDS and (extent := _extent(points)) > WIDEST_M:
+        raise UnknownUnit(
+            f"{frame.source}: coordinates are metres, but the points are spread over {extent:.4g}; "
+            "give --depth-unit (0.001 for millimetres, 1 if these are metres)"
+        )
+    return replace(frame, depth_unit=None)
+
+
+def _extent(points: NDArray[Any]) -> float:
+    """Longest side of the box around the points without the outer tenths, which outliers may fill."""
+    few = points.reshape(-1, 3)[:: max(1, points.size // 12_288)].astype(np.float64)
+    few = few[np.isfinite(few).all(axis=1)]
+    return float(np.ptp(np.percentile(few, [10, 90], axis=0), axis=0).max()) if len(few) else 0.0
 
 
 def _with_metres(frame: Frame, given: float | None) -> Frame:
@@ -79,6 +105,11 @@ def _with_raw_units(frame: Frame, given: float | None) -> Frame:
         raise UnknownUnit(f"{frame.source}: a depth unit of {unit} m is not possible; give --depth-unit in metres")
     depth = frame.depth
     assert depth is not None
+    if (median := _median(depth) * unit) > FARTHEST_M:
+        raise UnknownUnit(
+            f"{frame.source}: a depth unit of {unit} m puts the median depth at {median:.4g} m; give --depth-unit in "
+            "metres per raw unit, such as 0.001"
+        )
     raw = _as_uint16(depth)
     frame = _with_origin(frame, depth_unit=float(unit))
     if raw is None:
