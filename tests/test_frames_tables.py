@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
@@ -40,12 +41,24 @@ def test_labels_that_are_numbers_are_kept(tmp_path: Path) -> None:
     assert frame.labels.tolist() == [-1, 12]
 
 
+def test_a_long_word_among_the_labels_takes_no_memory_for_every_row(tmp_path: Path) -> None:
+    text = "7,1.5,2.5,3.5\n" * 2000 + "w" * 1_000_000 + ",4.5,5.5,6.5\n"
+    tracemalloc.start()
+    frame = read(put(tmp_path, text.encode()))
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert frame.labels is not None
+    assert frame.labels.tolist() == [7] * 2000 + [-1]
+    assert peak < 100_000_000
+
+
 BAD_TABLES = {
     "which columns": ("1 1.5 2.5 3.5\n2 4.5 5.5 6.5\n", "can't tell which of the 4 columns"),
     "words and more": ("a 1.5 2.5 3.5 4.5\n", "can't tell which"),
     "other names": ("range,azimuth,height\n1.5,2.5,3.5\n", "no columns x, y and z among range"),
     "whole numbers": ("1500 2500 3500\n4000 5000 6000\n", "--depth-unit"),
     "short line": ("1.5,2.5,3.5\n4.5,5.5\n", "below line 1"),
+    "row without its label": ("1.5 2.5 3.5 wall\n" * 3 + "4.5 5.5 6.5\n", "column"),
     "word": ("1.5,2.5,3.5\n" * 1500 + "4.5,x,6.5\n" + "1.5,2.5,3.5\n" * 1500, "'x'"),
     "bytes": ("1.5,2.5,3.5\n" * 1000 + "\0\0\n", "no text"),
     "all invalid": ("nan nan nan\nnan nan nan\n", "invalid"),

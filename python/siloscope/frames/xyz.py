@@ -24,6 +24,9 @@ from siloscope.frames.terms import UnknownUnit
 _SAMPLE = 200
 """Lines looked at from the start, the middle and the end to tell the columns."""
 
+_LABEL = np.dtype("U20")
+"""Room for a label: more than a whole number needs, and bounded, since every row takes as much."""
+
 _FORTRAN = re.compile(rb"(\d\.?)[dD]([+-]?\d)")
 
 
@@ -70,7 +73,7 @@ class TableSource(FrameSource):
             )
         columns = {axis: table[:, i] * self.layout.unit for i, axis in enumerate("xyz")}
         frame = cloud_frame(self.name, columns, None)
-        return replace(frame, labels=_labels(self._text, self.layout, len(table)))
+        return replace(frame, labels=_labels(self.name, self._text, self.layout, len(table)))
 
 
 def _text(path: Path) -> bytes:
@@ -99,10 +102,15 @@ def _filled_lines(text: bytes) -> int:
 
 def _numbers(name: str, text: bytes, known: Layout, columns: tuple[int, ...] | None) -> NDArray[np.float64]:
     """The wanted columns of all rows; raises `InputError` naming row and column of what is no number."""
-    text = _plain(text, known)
+    table: NDArray[np.float64] = _columns(name, _plain(text, known), known, np.float64, columns)
+    return table
+
+
+def _columns(name: str, text: bytes, known: Layout, dtype: Any, columns: tuple[int, ...] | None) -> NDArray[Any]:
+    reading: dict[str, Any] = {"delimiter": known.delimiter, "skiprows": known.first, "comments": "#"}
     with warnings.catch_warnings(action="ignore"):
         try:
-            return np.loadtxt(io.BytesIO(text), np.float64, usecols=columns, ndmin=2, **_reading(known))
+            return np.loadtxt(io.BytesIO(text), dtype, usecols=columns, ndmin=2, quotechar='"', **reading)
         except ValueError as error:
             raise InputError(f"{name}: below line {known.first + 1}, {error}; correct or export it again") from None
 
@@ -116,10 +124,6 @@ def _plain(text: bytes, known: Layout) -> bytes:
     return _FORTRAN.sub(rb"\1e\2", text) if known.fortran else text
 
 
-def _reading(known: Layout) -> dict[str, Any]:
-    return {"delimiter": known.delimiter, "skiprows": known.first, "comments": "#", "quotechar": '"'}
-
-
 def _raw(name: str, depth: NDArray[np.float64]) -> NDArray[Any]:
     """Whole numbers as raw units."""
     if not np.all((depth >= 0) & (depth <= 65_535)):
@@ -127,14 +131,17 @@ def _raw(name: str, depth: NDArray[np.float64]) -> NDArray[Any]:
     return depth.astype(np.uint16)
 
 
-def _labels(text: bytes, known: Layout, count: int) -> NDArray[np.int64] | None:
+def _labels(name: str, text: bytes, known: Layout, count: int) -> NDArray[np.int64] | None:
     """Labels that are whole numbers, -1 for other words; None where there are no numbers."""
     if known.label is None:
         return None
-    with warnings.catch_warnings(action="ignore"):
-        words = np.loadtxt(io.BytesIO(text), np.str_, usecols=(known.label,), ndmin=1, **_reading(known))
-    labels = np.array([int(word) if word.isascii() and word.isdigit() else -1 for word in words], np.int64)
+    words = _columns(name, text, known, _LABEL, (known.label,))[:, 0]
+    labels = np.array([_label(word) for word in words.tolist()], np.int64)
     return labels if len(labels) == count and np.any(labels >= 0) else None
+
+
+def _label(word: str) -> int:
+    return int(word) if word.isascii() and word.isdigit() and len(word) < 19 else -1
 
 
 def _sniff(head: bytes, path: Path) -> bool:
