@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import subprocess
@@ -14,8 +15,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import fuzz_frames
 import siloscope.frames
 from siloscope import Camera, Frame, InputError
+from siloscope.cli import main
 from siloscope.frames import archive
 
 CAMERA = Camera(64, 48, 57.0, 57.0, 31.5, 23.5, "brown_conrady", (0.1, -0.05, 1e-3, -2e-3, 0.01))
@@ -196,3 +199,34 @@ def test_a_file_in_the_way_is_not_overwritten(tmp_path: Path) -> None:
     with pytest.raises(InputError):
         archive.write(tmp_path, FRAMES)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.txt"]
+
+
+def test_convert_makes_an_archive_and_adds_to_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    recording, out = str(Path(__file__).parent / "data" / "realsense.bag"), tmp_path / "all.zarr"
+    for total in (3, 6):
+        assert main(["convert", recording, "-o", str(out), "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["frames"] == 3
+        assert len(siloscope.frames.open(out)) == total
+    assert main(["info", str(out), "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["depth_unit"] == pytest.approx(0.00025)
+
+
+def test_mutated_archives_break_no_rule(tmp_path: Path) -> None:
+    path, rng = tmp_path / "a.zarr", np.random.default_rng(4)
+    archive.write(path, FRAMES[:2])
+    files = {file: file.read_bytes() for file in path.rglob("*") if file.is_file()}
+    for _ in range(300):
+        file = list(files)[int(rng.integers(len(files)))]
+        file.write_bytes(fuzz_frames.mutated(rng, files[file]))
+        assert fuzz_frames.broken_rule(path) is None
+        file.write_bytes(files[file])
+
+
+def test_a_declared_length_without_its_frames_costs_no_time(tmp_path: Path) -> None:
+    path = tmp_path / "a.zarr"
+    archive.write(path, FRAMES)
+    head = path / "depth" / "zarr.json"
+    head.write_text(head.read_text().replace("5,\n", "999999999999,\n", 1))
+    source = siloscope.frames.open(path)
+    assert len(list(source)) == 5
+    assert "999999999994 of 999999999999 frames are missing" in source.problems[0]

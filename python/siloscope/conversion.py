@@ -13,6 +13,7 @@ import numpy as np
 from siloscope import writers
 from siloscope.errors import InputError, UsageError
 from siloscope.frame import Frame
+from siloscope.frames import archive
 
 FRAME_LIST = "frames.json"
 CAMERA_FILE = "camera.json"
@@ -31,11 +32,11 @@ class Sink(Protocol):
 
 
 def open_sink(out: Path, raw_unit: float | None = None) -> Sink:
-    """The sink that the name of the output asks for: one of `SINKS`, else a folder.
+    """The sink that the name of the output asks for: one of `SINKS`, else a folder; an archive is gone on with.
 
     `raw_unit` has floating-point depth written as 16-bit raw units of so many metres.
     """
-    if out.is_dir() and any(out.iterdir()):
+    if out.is_dir() and any(out.iterdir()) and not (out.suffix.lower() == ".zarr" and (out / "zarr.json").is_file()):
         raise UsageError(f"{out}: the folder is not empty; name a new one")
     if out.is_file():
         raise UsageError(f"{out}: exists already; name a new file or folder")
@@ -128,7 +129,23 @@ class PlySink:
         """Nothing is left to write."""
 
 
-SINKS: dict[str, Callable[[Path, float | None], Sink]] = {".npz": NpzSink, ".ply": PlySink}
+class ArchiveSink:
+    """An archive for many frames (`siloscope.frames.archive`); every frame is complete when it is added."""
+
+    def __init__(self, out: Path, raw_unit: float | None) -> None:
+        self.out, self.files = out, [out]
+        self._raw_unit = raw_unit
+        self._writer = archive.Writer(out)
+
+    def add(self, frame: Frame) -> None:
+        """Adds the frame behind those that are there."""
+        self._writer.append(as_raw(frame, self._raw_unit))
+
+    def finish(self) -> None:
+        """Nothing is left to write."""
+
+
+SINKS: dict[str, Callable[[Path, float | None], Sink]] = {".npz": NpzSink, ".ply": PlySink, ".zarr": ArchiveSink}
 """Sinks by the ending of the output's name; other names are folders."""
 
 

@@ -18,7 +18,10 @@ from siloscope.frames import FrameSource
 def convert(
     files: Annotated[list[Path], typer.Argument(metavar="FILE…", help="Recordings, images, arrays, clouds, folders.")],
     out: Annotated[
-        Path, typer.Option("--out", "-o", metavar="OUT", help="New folder, or a file: .npz (a stack), .ply (a cloud).")
+        Path,
+        typer.Option(
+            "--out", "-o", metavar="OUT", help="New folder, .zarr (an archive), .npz (a stack) or .ply (a cloud)."
+        ),
     ],
     camera: options.CameraFile = None,
     depth_unit: options.DepthUnit = None,
@@ -36,7 +39,8 @@ def convert(
     [bold]Example:[/bold] siloscope convert recording.bag -o frames
 
     A folder gets one file a frame (raw depth as 16-bit PNG, metres as .npy, points as PLY), camera.json with the unit,
-    and frames.json with all else; every command reads such a folder. Nothing is rounded unless --raw-unit says so.
+    and frames.json with all else; a name that ends in .zarr makes an archive for many frames, or adds to one. Every
+    command reads both. Nothing is rounded unless --raw-unit says so.
     Exit code 5 tells that some frames could not be read.
     """
     given = {"camera": camera, "depth_unit": depth_unit, "stream": stream, "ray_length": ray_length}
