@@ -35,6 +35,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("locate", "locate:locate", "Find the silo's axis and the camera's pose in one frame."),
     Command("info", "info:info", "Show what is inside a recording, image, array, cloud or folder."),
     Command("convert", "convert:convert", "Extract frames with their camera, times, gravity and provenance."),
+    Command("live", "live:live", "Locate continuously from a camera being mounted, with a hint which way to turn it."),
     Command("simulate", "simulate:simulate", "Write depth frames of a simulated silo, with their exact truth."),
 )
 

@@ -54,7 +54,7 @@ def guarded(run: Callable[[], Any], arguments: Sequence[str]) -> int:
 
 def print_json(document: Any) -> None:
     """Print the one JSON document of a command; NaN and infinities become null."""
-    print(json.dumps(_finite(document), indent=2, allow_nan=False))
+    print(json.dumps(finite(document), indent=2, allow_nan=False))
 
 
 @contextlib.contextmanager
@@ -113,15 +113,16 @@ def _silence_stdout() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
+    """A value as JSON has it: arrays as lists, NaN and infinities as null."""
     if isinstance(value, dict):
-        return {str(key): _finite(entry) for key, entry in value.items()}
+        return {str(key): finite(entry) for key, entry in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_finite(entry) for entry in value]
+        return [finite(entry) for entry in value]
     if isinstance(value, np.ndarray):
-        return _finite(value.tolist())
+        return finite(value.tolist())
     if isinstance(value, np.generic):
-        return _finite(value.item())
+        return finite(value.item())
     if isinstance(value, float) and not np.isfinite(value):
         return None
     return value

@@ -27,7 +27,7 @@ def print_estimate(estimate: Estimate, source: str) -> None:
         return
     console.print(f"[bold green]ok[/]      {source}: method {estimate.method}")
     console.print(pose_table(estimate))
-    for line in (tilt_line(estimate), silo_line(estimate.silo, estimate.silo_std), _seen(estimate.pixel_ratios)):
+    for line in (tilt_line(estimate), silo_line(estimate.silo, estimate.silo_std), ratios_line(estimate.pixel_ratios)):
         if line:
             console.print(line, markup=False)
 
@@ -78,7 +78,8 @@ def silo_line(silo: SiloGeometry, std: SiloGeometry) -> str:
     return "Silo: " + ", ".join(parts) + "."
 
 
-def _seen(ratios: Ratios | None) -> str:
+def ratios_line(ratios: Ratios | None) -> str:
+    """What the pixels show."""
     if ratios is None:
         return ""
     parts = [f"{name} {100 * share:.0f} %" for name, share in ratios.to_dict().items()]

@@ -28,7 +28,7 @@ from siloscope.frames.wire import Wire
 _FRAMES = re.compile(r"/(cam\d*)/sensor_(\d+)/frameType_(\d+)$")
 _DEPTH_SENSOR, _ACCEL_SENSOR = 3, 4
 _DEPTH_STREAM, _ACCEL_STREAM = 3, 4
-_DISTORTION = ("none", "modified brown conrady", "inverse brown conrady", "brown conrady", "rational", "kannala brandt")
+DISTORTION = ("none", "modified brown conrady", "inverse brown conrady", "brown conrady", "rational", "kannala brandt")
 """Distortion models in the SDK's numbering."""
 _YEAR_2001_US, _YEAR_2100_US = 1e15, 4.1e15
 _PRECISION_LEVEL, _FLEXIBLE_UNIT = 75, 176
@@ -160,7 +160,7 @@ def _profile(recording: Recording, camera: str, stream: int) -> _Profile | None:
 
 def _camera(name: str, profile: _Profile) -> Camera:
     k1, k2, k3, k4, k5, k6, p1, p2 = profile.distortion
-    model = _DISTORTION[profile.model] if profile.model < len(_DISTORTION) else str(profile.model)
+    model = DISTORTION[profile.model] if profile.model < len(DISTORTION) else str(profile.model)
     fisheye = model == "kannala brandt"
     d: tuple[float, ...] = (k1, k2, k3, k4) if fisheye else (k1, k2, p1, p2, k3, k4, k5, k6)
     return ros_messages.camera(name, profile.size, profile.intrinsic, model, () if model == "none" else d)
