@@ -7,14 +7,22 @@ import io
 import os
 import re
 from collections.abc import Callable
+from importlib import import_module
 from typing import Any
 
 _PLACE = re.compile(r"<!-- generated: (\w+) -->")
+_VALUE = re.compile(r"\{\{ ([\w.]+) \}\}")
+
+
+def _constant(module: str, name: str) -> str:
+    """A setting's value as the program has it."""
+    return str(getattr(import_module(f"siloscope.{module}"), name))
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Called by mkdocs with each page's source; replaces ``<!-- generated: NAME -->``."""
-    return _PLACE.sub(lambda found: _PARTS[found[1]](), markdown)
+    """Called by mkdocs with each page's source; fills ``<!-- generated: NAME -->`` and ``{{ module.CONSTANT }}``."""
+    filled = _PLACE.sub(lambda found: _PARTS[found[1]](), markdown)
+    return _VALUE.sub(lambda found: _constant(*found[1].rsplit(".", 1)), filled)
 
 
 def on_page_content(html: str, **_: Any) -> str:
@@ -44,8 +52,25 @@ def reasons() -> str:
     """Every reason for which a frame is refused."""
     from siloscope.surface import reasons as known
 
-    rows = [f"| `{slug}` | {meaning} | {advice} |" for slug, (meaning, advice) in known().items()]
+    return _advice(known())
+
+
+def calibration_reasons() -> str:
+    """Every reason for which there is no calibration."""
+    return _advice(import_module("siloscope.calibrate").REASONS)
+
+
+def _advice(known: dict[str, tuple[str, str]]) -> str:
+    rows = [f"| `{slug}` | {meaning} | {advice} |" for slug, (meaning, advice) in known.items()]
     return "\n".join(["| reason | what it means | what to try |", "|---|---|---|", *rows])
+
+
+def quality() -> str:
+    """Every remark on a calibration."""
+    from siloscope.calibration import QUALITY
+
+    rows = [f"| `{code}` | {meaning} |" for code, meaning in QUALITY.items()]
+    return "\n".join(["| code | meaning |", "|---|---|", *rows])
 
 
 def sensors() -> str:
@@ -57,3 +82,4 @@ def sensors() -> str:
 
 
 _PARTS: dict[str, Callable[[], str]] = {"commands": commands, "reasons": reasons, "sensors": sensors}
+_PARTS |= {"quality": quality, "calibration_reasons": calibration_reasons}
