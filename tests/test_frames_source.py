@@ -148,6 +148,18 @@ def test_points_in_millimetres_are_not_taken_for_metres(tmp_path: Path, name: st
     assert np.allclose(frame.points, points)
 
 
+def test_a_unit_does_not_shrink_what_is_metres_already(tmp_path: Path) -> None:
+    metres = (RAW * 0.001).astype(np.float32)
+    np.save(tmp_path / "metres.npy", metres)
+    (frame,) = siloscope.frames.open(tmp_path / "metres.npy", depth_unit=0.001)
+    assert np.array_equal(frame.depth, metres)
+    assert frame.provenance["depth_unit_from"] == "not applied: floating point is metres"
+    points = np.random.default_rng(2).uniform(-1.5, 1.5, (500, 3))
+    writers.write_ply(tmp_path / "metres.ply", points)
+    (frame,) = siloscope.frames.open(tmp_path / "metres.ply", depth_unit=0.001)
+    assert np.array_equal(frame.points, points)
+
+
 def test_ray_length_becomes_z(tmp_path: Path) -> None:
     z = np.full((48, 64), 2.0)
     length = z * np.sqrt(1 + np.sum(CAMERA.rays() ** 2, axis=2))

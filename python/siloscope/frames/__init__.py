@@ -68,7 +68,7 @@ def open(
     camera : Camera or path, optional
         Intrinsics, or a file with them; wins over the file's own.
     depth_unit : float, optional
-        Metres per raw unit; wins over the file's own.
+        Metres per raw unit; wins over the file's own. Floating-point values that are metres already stay so.
     stream : str, optional
         Which of several depth streams.
     ray_length : bool

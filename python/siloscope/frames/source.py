@@ -34,7 +34,7 @@ class Options:
     cameras : tuple of Camera
         Empty, or the user's camera; several where their file lists a resolution each (the frame's size chooses).
     depth_unit : float or None
-        Metres per raw unit (also scales floating-point depth and points).
+        Metres per raw unit. It also scales floating-point depth and points, unless they are metres already.
     camera_depth_unit : float or None
         Metres per raw unit as the user's camera file has it; wins over the file's own, for raw units only.
     stream : str or None

@@ -21,6 +21,9 @@ FARTHEST_M = 100.0
 WIDEST_M = 200.0
 """Extent above which points of a format that has no units are taken for some other unit than metres."""
 
+NEAREST_M = 0.05
+"""Median depth, or extent of points, below which a given unit is not meant for values that are metres already."""
+
 _UNITLESS_CLOUDS = ("ply", "pcd", "xyz", "npy", "npz", "folder")
 
 
@@ -37,18 +40,17 @@ def finish(frame: Frame, options: Options) -> Frame:
 
 def _with_unit(frame: Frame, options: Options) -> Frame:
     given = options.depth_unit
-    if given is not None:
-        frame = _with_origin(frame, depth_unit=given, depth_unit_from="given")
     if frame.points is not None:
         return _with_metric_points(frame, given)
     if frame.depth is None:
         return frame
     if np.issubdtype(frame.depth.dtype, np.floating):
         return _with_metres(frame, given)
-    if given is None and options.camera_depth_unit is not None:
-        given = options.camera_depth_unit
+    if given is not None:
+        return _with_raw_units(_with_origin(frame, depth_unit_from="given"), given)
+    if options.camera_depth_unit is not None:
         frame = _with_origin(frame, depth_unit_from="given camera file")
-    return _with_raw_units(frame, given)
+    return _with_raw_units(frame, options.camera_depth_unit)
 
 
 def _with_origin(frame: Frame, **known: Any) -> Frame:
@@ -58,9 +60,11 @@ def _with_origin(frame: Frame, **known: Any) -> Frame:
 def _with_metric_points(frame: Frame, given: float | None) -> Frame:
     points = frame.points
     assert points is not None
+    extent = _extent(points)
     if given is not None:
-        return replace(frame, points=points * points.dtype.type(given), depth_unit=None)
-    if frame.provenance.get("format") in _UNITLESS_CLOUDS and (extent := _extent(points)) > WIDEST_M:
+        factor, frame = _factor(frame, extent, given)
+        return replace(frame, points=points * points.dtype.type(factor), depth_unit=None)
+    if frame.provenance.get("format") in _UNITLESS_CLOUDS and extent > WIDEST_M:
         raise UnknownUnit(
             f"{frame.source}: coordinates are metres, but the points are spread over {extent:.4g}; "
             "give --depth-unit (0.001 for millimetres, 1 if these are metres)"
@@ -78,14 +82,24 @@ def _extent(points: NDArray[Any]) -> float:
 def _with_metres(frame: Frame, given: float | None) -> Frame:
     depth = frame.depth
     assert depth is not None
+    median = _median(depth)
     if given is not None:
-        return replace(frame, depth=depth * depth.dtype.type(given), depth_unit=None)
-    if (median := _median(depth)) > FARTHEST_M:
+        factor, frame = _factor(frame, median, given)
+        return replace(frame, depth=depth * depth.dtype.type(factor), depth_unit=None)
+    if median > FARTHEST_M:
         raise UnknownUnit(
             f"{frame.source}: floating-point depth is metres, but the median is {median:.4g}; "
             "give --depth-unit (0.001 for millimetres, 1 if these are metres)"
         )
     return replace(frame, depth_unit=None)
+
+
+def _factor(frame: Frame, size: float, given: float) -> tuple[float, Frame]:
+    """What floating-point values are multiplied by: the given unit, or 1 where that would leave millimetres of them,
+    since then they are metres already, as floating point is unless it can't be."""
+    if 0.0 < size * given < NEAREST_M:
+        return 1.0, _with_origin(frame, depth_unit_from="not applied: floating point is metres")
+    return given, _with_origin(frame, depth_unit=given, depth_unit_from="given")
 
 
 def _median(depth: NDArray[Any]) -> float:
