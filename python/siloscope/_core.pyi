@@ -45,7 +45,7 @@ def surface_fit_image(
     noise: tuple[float, float, float, float, float, float] | None = None,
     radius: tuple[float, float] | None = None,
     gravity: tuple[float, float, float, float] | None = None,
-    labels: bool = True,
+    labels: bool = False,
 ) -> dict[str, Any]: ...
 def surface_fit_cloud(
     points: NDArray[np.float64],
@@ -55,3 +55,4 @@ def surface_fit_cloud(
     threads: int = 1,
 ) -> dict[str, Any]: ...
 def surface_refusals() -> list[tuple[str, str, str]]: ...
+def depth_metres(depth: NDArray[Any], unit: float) -> tuple[NDArray[np.float32], int]: ...

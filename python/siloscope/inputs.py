@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from siloscope import _core
 from siloscope.camera import Camera
 from siloscope.errors import InputError
 from siloscope.frame import Frame
@@ -87,7 +88,7 @@ def _prepare_depth(
             f"{frame.source}: the frame is {width}x{height} pixels but the camera {chosen.width}x{chosen.height}; "
             "give the camera file of this stream"
         )
-    if not np.isfinite(chosen.rays()).all():
+    if chosen.distortion_model != "none" and not np.isfinite(chosen.rays()).all():
         raise InputError(f"{frame.source}: the camera's distortion can't be undone; check its coefficients")
     kept = _mask(mask, depth.shape, frame.source)
     if kept is not None:
@@ -133,21 +134,29 @@ def metres(frame: Frame) -> NDArray[np.float32]:
     _numeric(depth, frame.source)
     if depth.ndim != 2:
         raise InputError(f"{frame.source}: depth of shape {depth.shape}; give one image (H, W)")
-    if depth.dtype.kind in "iu":
-        unit = _unit(frame.depth_unit, frame.source)
-        valid = (depth > 0) & (depth != SENTINEL)
-        known = np.where(valid, depth, 0).astype(np.float32) * np.float32(unit)
-    else:
-        valid = np.isfinite(depth) & (depth > 0)
-        known = np.where(valid, depth, 0).astype(np.float32)
-        if valid.any() and float(np.median(known[valid])) > LONGEST:
-            raise InputError(
-                f"{frame.source}: floating-point depth is taken as metres, but its median is "
-                f"{float(np.median(known[valid])):.0f}; divide millimetres by 1000 first"
-            )
-    if not valid.any() and (depth != 0).any():
+    raw = depth.dtype.kind in "iu"
+    unit = _unit(frame.depth_unit, frame.source) if raw else 1.0
+    if raw and depth.dtype != np.uint16:
+        depth = np.where((depth > 0) & (depth < SENTINEL), depth, 0).astype(np.uint16)
+    elif not raw and depth.dtype not in (np.float32, np.float64):
+        depth = depth.astype(np.float64)
+    known, valid = _core.depth_metres(depth, unit)
+    if not raw and valid:
+        _not_millimetres(known, frame.source)
+    if not valid and (depth != 0).any():
         raise InputError(f"{frame.source}: every depth is invalid (NaN, negative or {SENTINEL}); check the recording")
     return known
+
+
+def _not_millimetres(known: NDArray[np.float32], source: str) -> None:
+    """Refuses floats that can't be metres, judged by every 97th pixel."""
+    thin = known.reshape(-1)[:: 97 if known.size > 9700 else 1]
+    typical = float(np.median(thin[thin > 0])) if (thin > 0).any() else 0.0
+    if typical > LONGEST:
+        raise InputError(
+            f"{source}: floating-point depth is taken as metres, but its median is {typical:.0f}; "
+            "divide millimetres by 1000 first"
+        )
 
 
 def _unit(unit: float | None, source: str) -> float:

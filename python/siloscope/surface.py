@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -61,12 +63,17 @@ class SurfaceDetails:
     """What pictures show of a fit.
 
     `points` (N, 3): patches in the silo frame; `residuals` (N,): their distance from the wall, NaN where a patch is not
-    wall; `labels` (H, W): 0 none, 1 cylinder, 2 cone, 3 feed, 4 other.
+    wall.
     """
 
     points: NDArray[np.float64]
     residuals: NDArray[np.float64]
-    labels: NDArray[np.uint8] | None
+    _labelled: Callable[[], NDArray[np.uint8]] | None = None
+
+    @cached_property
+    def labels(self) -> NDArray[np.uint8] | None:
+        """Label of each pixel (H, W): 0 none, 1 cylinder, 2 cone, 3 feed, 4 other. Worked out when asked for."""
+        return None if self._labelled is None else self._labelled()
 
 
 def fit_depth(
@@ -99,10 +106,16 @@ def fit_depth(
         Effective settings to record in the estimate.
     """
     radius, pull = _priors(diameter, diameter_std, gravity, gravity_std)
-    found = _core.surface_fit_image(depth, camera.rays(), profile.bias, profile.bias_std, profile.noise, radius, pull)
+    frame = (depth, camera.rays(), profile.bias, profile.bias_std, profile.noise, radius, pull)
+    found = _core.surface_fit_image(*frame)
     if "refusal" in found:
         return refused("surface", found["refusal"], config or {})
-    return _estimate(found, profile, config or {}, diameter, gravity)
+
+    def labelled() -> NDArray[np.uint8]:
+        labels: NDArray[np.uint8] = _core.surface_fit_image(*frame, labels=True)["labels"]
+        return labels
+
+    return _estimate(found, profile, config or {}, diameter, gravity, labelled)
 
 
 def fit_points(
@@ -179,6 +192,7 @@ def _estimate(
     config: dict[str, Any],
     diameter: float | None,
     gravity: NDArray[np.float64] | None,
+    labelled: Callable[[], NDArray[np.uint8]] | None = None,
 ) -> Estimate:
     pose = SiloPose(*found["pose"])
     covariance = found["covariance"]
@@ -199,7 +213,7 @@ def _estimate(
         timing_ms={name.replace(" ", "_"): ms for name, ms in found["timing"]},
         extra=extra,
         evidence=_evidence(found, profile, diameter, gravity),
-        details=SurfaceDetails(found["points"], found["residuals"], found.get("labels")),
+        details=SurfaceDetails(found["points"], found["residuals"], labelled),
     )
 
 

@@ -4,6 +4,7 @@ use pyo3::prelude::*;
 
 mod camera;
 mod convert;
+mod depth;
 mod files;
 mod scene;
 mod steps;
@@ -14,6 +15,7 @@ mod surface;
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     camera::register(m)?;
+    depth::register(m)?;
     files::register(m)?;
     scene::register(m)?;
     surface::register(m)?;

@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use siloscope::Vec3;
 use siloscope::fit::{Knowledge, Outcome, SurfaceFit, fit_cloud, fit_image};
-use siloscope::labels::{Labels, label_pixels};
+use siloscope::labels::{coverage, label_pixels};
 use siloscope::patches::DepthImage;
 use siloscope::refusal::Refusal;
 use siloscope::sensor::{DepthBias, DepthError, NoiseLaw};
@@ -36,9 +36,9 @@ fn depth_error(bias: Bias, bias_std: Bias, noise: Option<Noise>) -> DepthError {
 /// Fits the wall to a depth image: float32 depth (H, W) in metres and float64 rays (H, W, 2).
 ///
 /// Returns a dictionary of plain numbers and arrays; where there is no answer it holds only the reason, as `refusal`.
-/// With `labels` it also holds each pixel's label and what the labels cover.
+/// With `labels` it also holds each pixel's label.
 #[pyfunction]
-#[pyo3(signature = (depth, rays, bias, bias_std, noise=None, radius=None, gravity=None, labels=true))]
+#[pyo3(signature = (depth, rays, bias, bias_std, noise=None, radius=None, gravity=None, labels=false))]
 #[allow(clippy::too_many_arguments)]
 fn surface_fit_image<'py>(
     py: Python<'py>,
@@ -70,7 +70,7 @@ fn surface_fit_image<'py>(
     });
     let out = outcome(py, found.0)?;
     if let Some(labels) = found.1 {
-        add_labels(py, &out, labels, (height, width))?;
+        out.set_item("labels", PyArray1::from_vec(py, labels).reshape([height, width])?)?;
     }
     Ok(out)
 }
@@ -111,12 +111,6 @@ fn outcome(py: Python<'_>, found: Outcome) -> PyResult<Bound<'_, PyDict>> {
     }
 }
 
-fn add_labels(py: Python<'_>, out: &Bound<'_, PyDict>, labels: Labels, shape: (usize, usize)) -> PyResult<()> {
-    out.set_item("labels", PyArray1::from_vec(py, labels.pixels).reshape([shape.0, shape.1])?)?;
-    out.set_item("pixel_counts", labels.counts)?;
-    out.set_item("areas", labels.areas)
-}
-
 fn add_share(py: Python<'_>, out: &Bound<'_, PyDict>, share: &FrameShare) -> PyResult<()> {
     for (name, m) in [("information", &share.information), ("scatter", &share.scatter), ("noise_share", &share.noise)] {
         out.set_item(name, matrix(py, m)?)?;
@@ -135,6 +129,11 @@ fn result<'py>(py: Python<'py>, found: &SurfaceFit) -> PyResult<Bound<'py, PyDic
     out.set_item("pose", (pose.r_x, pose.r_y, pose.t_x, pose.t_y))?;
     out.set_item("radius", found.fit.surface.radius)?;
     out.set_item("cone", found.fit.surface.cone.map(|c| (c.slope, c.apex)))?;
+    if !found.patches.cloud {
+        let seen = coverage(found);
+        out.set_item("pixel_counts", seen.counts)?;
+        out.set_item("areas", seen.areas)?;
+    }
     out.set_item("ovality", found.fit.surface.ovality)?;
     let bias = found.fit.bias;
     out.set_item("bias", (bias.offset, bias.scale, bias.quadratic))?;

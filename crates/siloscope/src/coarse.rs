@@ -66,10 +66,12 @@ fn candidates(problem: &Problem, view: View) -> Vec<(f64, Fit)> {
             misfit: 0.03 * start.surface.size(),
             weights: vec![0.0; problem.patches.list.len()],
         };
-        problem.refine(&mut fit, 5, 6, 0.25);
+        problem.refine(&mut fit, 4, 8, 0.25);
         (likelihood(problem, &fit), fit)
     };
-    starts(&oriented(problem, &problem.prior.bias), view).into_iter().take(5).map(refined).collect()
+    let found = starts(&oriented(problem, &problem.prior.bias), view);
+    let bar = 0.4 * found.first().map_or(0.0, |best| best.score);
+    found.into_iter().take_while(|start| start.score >= bar).take(4).map(refined).collect()
 }
 
 /// Refines a candidate on more patches and holds it against the evidence.

@@ -18,7 +18,8 @@ pub fn widened(
     let blocks = groups(equations, |i, _| block(problem, i));
     let size = equations.iter().map(|(_, e)| e.z.abs()).fold(0.0, f64::max).max(1e-6);
     let rings = groups(equations, |_, e| (e.z / size * RINGS).floor() as i64);
-    let sectors = groups(equations, |_, e| (e.azimuth / std::f64::consts::TAU * SECTORS).floor() as i64);
+    let sectors =
+        groups(equations, |_, e| (e.across[1].atan2(e.across[0]) / std::f64::consts::TAU * SECTORS).floor() as i64);
     [blocks, rings, sectors].iter().fold(*model, |covariance, groups| {
         let spread = groups.iter().fold(system.prior, |sum, g| sum + g * g.transpose());
         larger(&covariance, &(model * spread * model * chance(groups.len())))

@@ -194,7 +194,7 @@ fn finish(
     evidence: WallEvidence,
     noise_is_known: bool,
 ) -> Option<SurfaceFit> {
-    let (system, total) = solve_equations(problem, &mut fit, tiles)?;
+    let (system, total) = solve_equations(problem, &mut fit, tiles, 4)?;
     let equations: Vec<(usize, Equation)> =
         tiles.iter().map(|t| (t.patch, moved(&t.equation, &total, fit.misfit))).collect();
     let (model, free) = system.covariance(&fit)?;

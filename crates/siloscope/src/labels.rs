@@ -15,29 +15,20 @@ pub const FEED: u8 = 3;
 /// What is no surface: dust, flying pixels, returns from behind the wall.
 pub const OTHER: u8 = 4;
 
-/// Labels of a frame and how much of it each one covers.
+/// How much of a frame each label covers.
 #[derive(Debug, Clone, Default)]
-pub struct Labels {
-    /// Label of each pixel, row by row.
-    pub pixels: Vec<u8>,
+pub struct Coverage {
     /// Number of pixels with each label.
     pub counts: [f64; 5],
     /// True surface with each label, m².
     pub areas: [f64; 5],
 }
 
-/// Labels every pixel by the fitted wall.
-pub fn label_pixels(image: &DepthImage, found: &SurfaceFit) -> Labels {
+/// Labels every pixel by the fitted wall, row by row.
+pub fn label_pixels(image: &DepthImage, found: &SurfaceFit) -> Vec<u8> {
     let placed = PlacedSurface::new(found.fit.surface);
-    let mut labels = Labels { pixels: vec![NONE; image.depth.len()], ..Labels::default() };
-    for (v, u) in (0..image.height).flat_map(|v| (0..image.width).map(move |u| (v, u))) {
-        let i = v * image.width + u;
-        let label = label(image, found, &placed, (u, v));
-        labels.pixels[i] = label;
-        labels.counts[label as usize] += 1.0;
-    }
-    add_areas(&mut labels, image, found, &placed);
-    labels
+    let pixels = (0..image.height).flat_map(|v| (0..image.width).map(move |u| (u, v)));
+    pixels.map(|at| label(image, found, &placed, at)).collect()
 }
 
 fn label(image: &DepthImage, found: &SurfaceFit, placed: &PlacedSurface, (u, v): (usize, usize)) -> u8 {
@@ -47,17 +38,21 @@ fn label(image: &DepthImage, found: &SurfaceFit, placed: &PlacedSurface, (u, v):
         return NONE;
     }
     let [x, y] = image.rays[i];
-    let q = crate::Vec3::new(x, y, 1.0);
-    let (wall, part) = placed.depth(&q);
+    let surface = has_company(image, (u, v), 0.02 * measured + 4.0 * found.noise.sigma(measured));
+    label_of(found, placed, &crate::Vec3::new(x, y, 1.0), measured, surface)
+}
+
+/// The label of a measured depth on a ray; `surface` tells whether its surroundings lie about as deep.
+fn label_of(found: &SurfaceFit, placed: &PlacedSurface, q: &crate::Vec3, measured: f64, surface: bool) -> u8 {
+    let (wall, part) = placed.depth(q);
     let residual = measured - found.fit.bias.measured(wall);
     let sigma = found.noise.sigma(wall.min(2.0 * measured));
     let at = placed.local_of(placed.to_silo(&(q * wall)), part);
-    let cosine = (at.gradient.dot(&placed.turn(&q)) / (at.gradient.norm() * q.norm())).abs().max(0.02);
+    let cosine = (at.gradient.dot(&placed.turn(q)) / (at.gradient.norm() * q.norm())).abs().max(0.02);
     let tolerance = 4.0 * sigma + 3.0 * found.fit.misfit / cosine;
     if residual.abs() <= tolerance {
         return if part == Part::Cylinder { CYLINDER } else { CONE };
     }
-    let surface = has_company(image, (u, v), 0.02 * measured + 4.0 * found.noise.sigma(measured));
     if surface && (residual <= 0.0 || residual.is_nan()) { FEED } else { OTHER }
 }
 
@@ -71,23 +66,20 @@ fn has_company(image: &DepthImage, (u, v): (usize, usize), reach: f64) -> bool {
     [(0, 1), (2, 1), (1, 0), (1, 2)].into_iter().filter(|&(du, dv)| near(du, dv)).count() >= 2
 }
 
-/// Surface area: a pixel at depth d with ray q covers d²·|q_u × q_v| / |n·q|, by tiles.
-fn add_areas(labels: &mut Labels, image: &DepthImage, found: &SurfaceFit, placed: &PlacedSurface) {
-    let side = found.patches.side;
+/// What each label covers, tile by tile: a tile counts as what its mean depth shows.
+///
+/// A pixel at depth d with ray q covers the surface d²·|q_u × q_v| / |n·q|.
+pub fn coverage(found: &SurfaceFit) -> Coverage {
+    let placed = PlacedSurface::new(found.fit.surface);
+    let mut coverage = Coverage::default();
     for patch in &found.patches.list {
-        let (u0, v0) = (patch.tile.0 as usize * side, patch.tile.1 as usize * side);
-        let mut counts = [0.0; 5];
-        for v in v0..v0 + side {
-            for &label in &labels.pixels[v * image.width + u0..][..side] {
-                counts[label as usize] += 1.0;
-            }
-        }
+        let label = label_of(found, &placed, &patch.q, patch.measured, true);
         let d = found.fit.bias.true_depth(patch.measured);
         let pixel = patch.ray_steps[0].cross(&patch.ray_steps[1]).norm() * d * d;
-        for (label, count) in counts.into_iter().enumerate().filter(|(_, n)| *n > 0.0) {
-            labels.areas[label] += count * pixel / facing(label as u8, patch, placed, d);
-        }
+        coverage.counts[usize::from(label)] += patch.count;
+        coverage.areas[usize::from(label)] += patch.count * pixel / facing(label, patch, &placed, d);
     }
+    coverage
 }
 
 /// |n·q| of a tile: of the fitted wall for wall pixels, of the tile's own normal for the rest.

@@ -45,39 +45,70 @@ pub fn tile_residual(
     if [last, last * image.width, last * (image.width + 1)].into_iter().any(|o| part_at(o) != part) {
         return TileResidual::default();
     }
-    match part {
-        Part::Cylinder => {
-            sums(image, corner, side, bias, sampling, |q| placed.rounded(q, placed.cylinder_depth(q), part))
-        }
-        Part::Cone => sums(image, corner, side, bias, sampling, |q| placed.rounded(q, placed.cone_depth(q), part)),
+    let tile = Tile { image, corner, side, bias, sampling };
+    match (part, placed.surface.ovality == [0.0; 2]) {
+        (Part::Cylinder, true) => tile.residual(|q| placed.cylinder_depth(q)),
+        (Part::Cone, true) => tile.residual(|q| placed.cone_depth(q)),
+        (Part::Cylinder, false) => tile.residual(|q| placed.rounded(q, placed.cylinder_depth(q), part)),
+        (Part::Cone, false) => tile.residual(|q| placed.rounded(q, placed.cone_depth(q), part)),
     }
 }
 
-#[inline]
-fn sums(
-    image: &DepthImage,
+struct Tile<'a> {
+    image: &'a DepthImage<'a>,
     corner: usize,
     side: usize,
-    bias: &DepthBias,
-    Sampling { stride, reach }: Sampling,
-    depth: impl Fn([f64; 2]) -> f64,
-) -> TileResidual {
-    let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
-    for v in (0..side).step_by(stride) {
-        let start = corner + v * image.width;
-        let (rays, depths) = (&image.rays[start..start + side], &image.depth[start..start + side]);
-        for (ray, &measured) in rays.iter().zip(depths).step_by(stride) {
-            let residual = f64::from(measured) - bias.measured(depth(*ray));
-            let counts = measured > 0.0 && residual.abs() < reach;
-            let residual = if counts { residual } else { 0.0 };
-            n += f64::from(u8::from(counts));
-            sum += residual;
-            squares += residual * residual;
+    bias: &'a DepthBias,
+    sampling: Sampling,
+}
+
+/// Pixels of a tile's row worked on together: straight loops over them become vector instructions.
+const LANES: usize = 16;
+
+impl Tile<'_> {
+    #[inline(always)]
+    fn residual(&self, depth: impl Fn([f64; 2]) -> f64) -> TileResidual {
+        let (mut n, mut sum, mut squares) = (0.0, 0.0, 0.0);
+        for v in (0..self.side).step_by(self.sampling.stride) {
+            let (residuals, lanes) = self.row(v, &depth);
+            for residual in &residuals[..lanes] {
+                let counts = residual.abs() < self.sampling.reach;
+                let kept = if counts { *residual } else { 0.0 };
+                n += if counts { 1.0 } else { 0.0 };
+                sum += kept;
+                squares += kept * kept;
+            }
         }
+        if n < 3.0 {
+            return TileResidual::default();
+        }
+        let mean = sum / n;
+        TileResidual { count: n, mean, scatter: ((squares - sum * mean).max(0.0) / (n - 1.0)).sqrt() }
     }
-    if n < 3.0 {
-        return TileResidual::default();
+
+    /// Residuals of a row's pixels, infinite where there is no depth, and how many there are.
+    #[inline(always)]
+    fn row(&self, v: usize, depth: &impl Fn([f64; 2]) -> f64) -> ([f64; LANES], usize) {
+        let start = self.corner + v * self.image.width;
+        let (rays, depths) = (&self.image.rays[start..start + self.side], &self.image.depth[start..start + self.side]);
+        let mut residuals = [f64::INFINITY; LANES];
+        let lanes = self.side.div_ceil(self.sampling.stride).min(LANES);
+        if self.sampling.stride == 1 {
+            for ((residual, &ray), &measured) in residuals.iter_mut().zip(rays).zip(depths) {
+                *residual = self.difference(measured, depth(ray));
+            }
+        } else {
+            let every = rays.iter().zip(depths).step_by(self.sampling.stride);
+            for (residual, (&ray, &measured)) in residuals.iter_mut().zip(every) {
+                *residual = self.difference(measured, depth(ray));
+            }
+        }
+        (residuals, lanes)
     }
-    let mean = sum / n;
-    TileResidual { count: n, mean, scatter: ((squares - sum * mean).max(0.0) / (n - 1.0)).sqrt() }
+
+    #[inline(always)]
+    fn difference(&self, measured: f32, wall: f64) -> f64 {
+        let missing = if measured > 0.0 { 0.0 } else { f64::INFINITY };
+        f64::from(measured) - self.bias.measured(wall) + missing
+    }
 }

@@ -33,7 +33,7 @@ pub fn polish(
         let sample = |e: &TileEquation| (problem.patches.list[e.patch].measured, e.scatter);
         noise_from_scatter(&mut equations.iter().map(sample).collect::<Vec<_>>(), 1e-5)
     });
-    solve_equations(problem, fit, &equations);
+    solve_equations(problem, fit, &equations, 2);
     noise
 }
 
@@ -96,11 +96,16 @@ fn noise_factor(equations: &[TileEquation]) -> f64 {
 }
 
 /// Robust solution of linear equations: reweighted a few times, the misfit re-estimated on the way.
-pub fn solve_equations(problem: &Problem, fit: &mut Fit, equations: &[TileEquation]) -> Option<(System, Parameters)> {
+pub fn solve_equations(
+    problem: &Problem,
+    fit: &mut Fit,
+    equations: &[TileEquation],
+    rounds: usize,
+) -> Option<(System, Parameters)> {
     let mut total = Parameters::zeros();
     let mut misfit = fit.misfit;
     let mut system = System::with_prior(problem.prior, fit);
-    for _ in 0..4 {
+    for _ in 0..rounds {
         system = System::with_prior(problem.prior, fit);
         for tile in equations {
             let moved = moved(&tile.equation, &total, misfit);

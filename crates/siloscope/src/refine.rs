@@ -57,8 +57,8 @@ pub struct Equation {
     pub part: Part,
     /// Height in the silo frame.
     pub z: f64,
-    /// Azimuth about the axis, radians.
-    pub azimuth: f64,
+    /// Position across the axis: x and y in the silo frame.
+    pub across: [f64; 2],
 }
 
 /// Everything that stays the same during a fit.
@@ -122,7 +122,7 @@ impl Problem<'_> {
             angle2: 2.0 * (1.0 - agreement),
             part: at.part,
             z: at.p.z,
-            azimuth: at.p.y.atan2(at.p.x),
+            across: [at.p.x, at.p.y],
         })
     }
 
@@ -281,21 +281,20 @@ impl System {
     #[inline]
     pub fn add(&mut self, equation: &Equation, weight: f64) {
         let scale = weight / equation.variance;
-        let j = equation.jacobian.as_slice();
-        let h = self.information.as_mut_slice();
-        for column in 0..PARAMETERS {
-            let factor = scale * j[column];
-            for row in 0..=column {
-                h[column * PARAMETERS + row] += factor * j[row];
+        let j: &[f64; PARAMETERS] = &equation.jacobian.data.0[0];
+        let h: &mut [[f64; PARAMETERS]; PARAMETERS] = &mut self.information.data.0;
+        for (column, &of_column) in h.iter_mut().zip(j) {
+            let factor = scale * of_column;
+            for (entry, &of_row) in column.iter_mut().zip(j) {
+                *entry += factor * of_row;
             }
-            self.gradient[column] += factor * equation.residual;
         }
+        self.gradient += equation.jacobian * (scale * equation.residual);
     }
 
     /// H with unit information on the parameters that are not free, scaled to a unit diagonal; the scale; who is free.
     fn scaled(&self, fit: &Fit) -> (Information, Parameters, [bool; PARAMETERS]) {
         let mut h = self.information;
-        h.fill_lower_triangle_with_upper_triangle();
         let free = free_parameters(fit, &self.prior);
         let mut scale = Parameters::zeros();
         for k in 0..PARAMETERS {

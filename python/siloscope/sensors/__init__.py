@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import tomllib
 from dataclasses import dataclass, field
+from functools import cache
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -69,10 +70,20 @@ UNKNOWN = SensorProfile(
 """A sensor of which nothing is known."""
 
 
+@cache
+def _shipped(name: str) -> SensorProfile:
+    return _parse(resources.files(__name__).joinpath(f"{name}.toml").read_bytes(), name)
+
+
 def names() -> list[str]:
     """Names of the profiles that come with siloscope."""
+    return list(_names())
+
+
+@cache
+def _names() -> tuple[str, ...]:
     files = resources.files(__name__).iterdir()
-    return sorted(file.name.removesuffix(".toml") for file in files if file.name.endswith(".toml"))
+    return tuple(sorted(file.name.removesuffix(".toml") for file in files if file.name.endswith(".toml")))
 
 
 def load(sensor: str | Path | SensorProfile | None) -> SensorProfile:
@@ -88,7 +99,7 @@ def load(sensor: str | Path | SensorProfile | None) -> SensorProfile:
     if sensor is None or isinstance(sensor, SensorProfile):
         return sensor or UNKNOWN
     if str(sensor) in names():
-        return _parse(resources.files(__name__).joinpath(f"{sensor}.toml").read_bytes(), str(sensor))
+        return _shipped(str(sensor))
     path = Path(sensor)
     if path.is_file():
         return _parse(_content(path), str(path))
