@@ -79,7 +79,7 @@ fn settled(problem: &Problem, mut fit: Fit) -> Result<(Fit, WallEvidence), Refus
     if fit.surface.cone.is_none() != fit.surface.radius.is_none() && fit.inside {
         fit = with_other_part(problem, fit);
     }
-    problem.refine(&mut fit, 3, 2, 0.15);
+    problem.refine(&mut fit, 3, 3, 0.15);
     if fit.surface.cone.is_some_and(|c| c.slope > FEED_SLOPE) && !apex_is_covered(problem, &fit) {
         if fit.surface.radius.is_none() {
             return Err(Refusal::ConeMayBeFeed);

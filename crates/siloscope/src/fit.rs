@@ -6,7 +6,7 @@ use crate::cloud::cloud_patches;
 use crate::coarse::{coarse_fit, wall_patches};
 use crate::covariance::{relief_uncertainty, scale_uncertainty, widened};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
-use crate::polish::{TileEquation, moved, patch_equations, pixel_equations, polish, solve_equations};
+use crate::polish::{ALL, TileEquation, moved, patch_equations, pixel_equations, polish, solve_equations};
 use crate::refine::{Equation, Fit, Prior, Problem, tukey};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, DepthError, NoiseLaw};
@@ -56,9 +56,6 @@ const OVAL_MISFIT: f64 = 1e-3;
 /// Standard deviation of each part of a real silo's ovality.
 const OVALITY_STD: f64 = 0.005;
 
-/// The first passes over the pixels take every fourth pixel of every fourth row.
-const POLISH_STRIDE: usize = 4;
-
 /// Fits the wall to a depth image.
 pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     let mut clock = Clock::start();
@@ -77,18 +74,18 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     let mut problem = Problem { patches: &patches, noise, prior: &prior, pixel };
     let wall = wall_patches(&problem, &fit);
     for reach in [3.0, 2.0] {
-        problem.noise = polish(&problem, image, &mut fit, &wall, (POLISH_STRIDE, reach), know.error.noise);
+        problem.noise = polish(&problem, image, &mut fit, &wall, reach, know.error.noise);
     }
     let noise = problem.noise;
     if fit.misfit > OVAL_MISFIT * fit.surface.size() {
         prior.ovality_std = OVALITY_STD;
         for reach in [3.0, 2.0] {
             let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-            polish(&problem, image, &mut fit, &wall, (POLISH_STRIDE, reach), Some(noise));
+            polish(&problem, image, &mut fit, &wall, reach, Some(noise));
         }
     }
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-    let equations = pixel_equations(&problem, image, &fit, &wall, (1, 1.0));
+    let equations = pixel_equations(&problem, image, &fit, &wall, &ALL);
     clock.lap("pixels");
     let mut result =
         finish(&problem, fit, &equations, evidence, know.error.noise.is_some()).ok_or(Refusal::PoorlyDetermined)?;

@@ -25,10 +25,10 @@ pub fn polish(
     image: &DepthImage,
     fit: &mut Fit,
     wall: &[bool],
-    (stride, reach): (usize, f64),
+    reach: f64,
     known: Option<NoiseLaw>,
 ) -> NoiseLaw {
-    let equations = pixel_equations(problem, image, fit, wall, (stride, reach));
+    let equations = pixel_equations(problem, image, fit, wall, &Thinning { reach, ..SKETCH });
     let noise = known.unwrap_or_else(|| {
         let sample = |e: &TileEquation| (problem.patches.list[e.patch].measured, e.scatter);
         noise_from_scatter(&mut equations.iter().map(sample).collect::<Vec<_>>(), 1e-5)
@@ -37,15 +37,32 @@ pub fn polish(
     noise
 }
 
-/// Equations of the wall's tiles from every `stride`-th pixel; pixels further off than the noise and `reach` misfits
-/// allow don't count.
+/// Which pixels of the wall are asked.
+#[derive(Debug, Clone, Copy)]
+pub struct Thinning {
+    /// Every so many tiles.
+    pub tiles: usize,
+    /// Every so many pixels along a tile's rows and columns.
+    pub stride: usize,
+    /// Pixels further off than the noise and so many misfits allow don't count.
+    pub reach: f64,
+}
+
+/// Every pixel: the answer.
+pub const ALL: Thinning = Thinning { tiles: 1, stride: 1, reach: 1.0 };
+
+/// One pixel in twelve: the steps towards it.
+const SKETCH: Thinning = Thinning { tiles: 3, stride: 2, reach: 3.0 };
+
+/// Equations of the wall's tiles from their pixels.
 pub fn pixel_equations(
     problem: &Problem,
     image: &DepthImage,
     fit: &Fit,
     wall: &[bool],
-    (stride, reach): (usize, f64),
+    thinning: &Thinning,
 ) -> Vec<TileEquation> {
+    let Thinning { tiles, stride, reach } = *thinning;
     let placed = PlacedSurface::new(fit.surface);
     let tile = |patch: usize| {
         let (d, _) = placed.depth(&problem.patches.list[patch].q);
@@ -59,7 +76,7 @@ pub fn pixel_equations(
         let equation = Equation { residual: seen.mean, variance: single / seen.count, ..equation };
         enough.then_some(TileEquation { patch, equation, scatter: seen.scatter, count: seen.count })
     };
-    (0..wall.len()).filter(|&i| wall[i]).filter_map(tile).collect()
+    (0..wall.len()).filter(|&i| wall[i]).step_by(tiles).filter_map(tile).collect()
 }
 
 /// Equations of a cloud's wall patches from their own means.

@@ -33,7 +33,7 @@ impl Oriented {
 
     /// Distance from the z-axis, and the normal's radial and axial parts with the radial one turned inwards if unsigned.
     fn meridian(&self) -> (f64, f64, f64) {
-        let rho = self.p.x.hypot(self.p.y).max(1e-9);
+        let rho = (self.p.x * self.p.x + self.p.y * self.p.y).sqrt().max(1e-9);
         let n_rho = (self.n.x * self.p.x + self.n.y * self.p.y) / rho;
         let turn = if !self.signed && n_rho > 0.0 { -1.0 } else { 1.0 };
         (rho, turn * n_rho, turn * self.n.z)

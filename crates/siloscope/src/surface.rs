@@ -166,7 +166,7 @@ impl PlacedSurface {
     /// The implicit function of a given part at a point of the silo frame; the other part where that one is missing.
     #[inline]
     pub fn local_of(&self, p: Vec3, part: Part) -> Local {
-        let rho = p.x.hypot(p.y).max(1e-12);
+        let rho = (p.x * p.x + p.y * p.y).sqrt().max(1e-12); // lengths here are far from overflow: no hypot needed
         let [x, y] = [p.x / rho, p.y / rho];
         let (part, radius, rise) = match (part, self.surface.radius, self.surface.cone) {
             (Part::Cone, _, Some(cone)) | (Part::Cylinder, None, Some(cone)) => {
