@@ -92,10 +92,12 @@ fn settled(problem: &Problem, mut fit: Fit) -> Result<(Fit, WallEvidence), Refus
     judge(&evidence, fit.inside).map(|()| (fit, evidence))
 }
 
-/// Whether something else lies before the cone all around its vertex: then the cone is no surface of feed.
+/// Whether something else lies well before the cone all around its vertex: then the cone is no surface of feed.
+///
+/// A funnel of feed also has a rounded tip, which lies a little before its own cone.
 fn apex_is_covered(problem: &Problem, fit: &Fit) -> bool {
     let placed = PlacedSurface::new(fit.surface);
-    let reach = 0.3 * fit.surface.size();
+    let (reach, cover) = (0.06 * fit.surface.size(), 0.08 * fit.surface.size());
     let (mut near, mut covered) = (0, 0);
     for patch in &problem.patches.list {
         let (d, part) = placed.depth(&patch.q);
@@ -105,9 +107,9 @@ fn apex_is_covered(problem: &Problem, fit: &Fit) -> bool {
         }
         let before = d - fit.bias.true_depth(patch.measured);
         near += 1;
-        covered += i32::from(before > 0.02 * reach + 4.0 * problem.noise.sigma(d) / patch.count.sqrt());
+        covered += i32::from(before > cover + 4.0 * problem.noise.sigma(d) / patch.count.sqrt());
     }
-    near >= 5 && covered * 10 >= near * 7
+    near >= 4 && covered * 10 >= near * 7
 }
 
 /// What has to hold on a wall of revolution.
