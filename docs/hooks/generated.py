@@ -69,8 +69,19 @@ def quality() -> str:
     """Every remark on a calibration."""
     from siloscope.calibration import QUALITY
 
-    rows = [f"| `{code}` | {meaning} |" for code, meaning in QUALITY.items()]
-    return "\n".join(["| code | meaning |", "|---|---|", *rows])
+    return _meanings("code", QUALITY)
+
+
+def frame_statuses() -> str:
+    """What may become of a frame in a calibration."""
+    from siloscope.calibration import STATUSES
+
+    return _meanings("status", STATUSES)
+
+
+def _meanings(head: str, known: dict[str, str]) -> str:
+    rows = [f"| `{name}` | {meaning} |" for name, meaning in known.items()]
+    return "\n".join([f"| {head} | meaning |", "|---|---|", *rows])
 
 
 def sensors() -> str:
@@ -82,4 +93,4 @@ def sensors() -> str:
 
 
 _PARTS: dict[str, Callable[[], str]] = {"commands": commands, "reasons": reasons, "sensors": sensors}
-_PARTS |= {"quality": quality, "calibration_reasons": calibration_reasons}
+_PARTS |= {"quality": quality, "calibration_reasons": calibration_reasons, "frame_statuses": frame_statuses}

@@ -19,9 +19,15 @@ from siloscope.surface import PARAMETERS, SurfaceEvidence
 
 SCHEMA = "siloscope.calibration/1"
 
-STATUSES = ("used", "rejected", "before-move", "not-averaged", "refused", "unreadable")
-"""What became of a frame: fused; read, but it disagrees with the others; taken before the camera moved; older than
-the last 10 of the paper's rule; shows too little wall; can't be read."""
+STATUSES = {
+    "used": "fused, with the weight that stands beside it",
+    "rejected": "it has an answer, but one that disagrees with the other frames'",
+    "before-move": "taken before the camera moved",
+    "not-averaged": "older than the last 10 of the paper's rule",
+    "refused": "read well, but it does not show enough wall; its reason says why",
+    "unreadable": "it can't be read or used",
+}
+"""What becomes of a frame: stable name and what it means."""
 
 QUALITY = {
     "camera-moved": "the camera moved during the sequence; only the frames since are fused",

@@ -191,7 +191,7 @@ def _record(table: dict[str, Any], where: str) -> FrameRecord:
     return FrameRecord(
         index=_index(table, where),
         name=_entry(table, "name", str, f"{where}.name"),
-        status=_one_of(table, "status", STATUSES, where),
+        status=_one_of(table, "status", tuple(STATUSES), where),
         weight=_number(table, "weight", least=0.0, where=where),
         deviation=None if deviation is None else _finite(deviation, f"{where}.deviation"),
         pose=None if table.get("r_x") is None else _pose(table, where),

@@ -17,6 +17,8 @@ from siloscope.surface import PARAMETERS, SurfaceEvidence
 
 SIZE = len(PARAMETERS)
 RADIUS, SCALE, QUADRATIC = (PARAMETERS.index(name) for name in ("radius", "scale", "quadratic"))
+BIAS = PARAMETERS.index("offset")
+"""From here on a parameter is estimated only where a prior holds it."""
 LENGTHS = tuple(PARAMETERS.index(name) for name in ("t_x", "t_y", "radius", "apex"))
 """Parameters that grow with the depth scale."""
 
@@ -103,8 +105,8 @@ class Stack:
             shift = np.where(fixed, self.answers[None, :, SCALE] - centres[:, None, SCALE], 0.0)
             lengths = np.nan_to_num(centres)[:, None, list(LENGTHS)] * known[:, :, list(LENGTHS)]
             gaps[:, :, list(LENGTHS)] += shift[:, :, None] * lengths
-        across = np.matmul(gaps.transpose(1, 0, 2), self.metric).transpose(1, 0, 2)
-        squared: Matrix = (across * gaps).sum(axis=2)
+        across = np.einsum("kni,nij->knj", gaps, self.metric)
+        squared: Matrix = np.einsum("knj,knj->kn", across, gaps)
         return squared
 
 
@@ -147,7 +149,7 @@ def solve(stack: Stack, weights: Matrix, base: Sums) -> Matrix:
     """Answers (K, 12) to K weightings (K, N): ``(Σ w Λ + Π)⁻¹ (Σ w (Λ θ - g) + Π μ)``; NaN for what nobody saw."""
     system, pull, origin, solved = _systems(stack, weights, base)
     answers = origin + _solve(system, pull[:, :, None])[:, :, 0]
-    answers[:, :7][~solved[:, :7]] = np.nan
+    answers[:, :BIAS][~solved[:, :BIAS]] = np.nan
     return answers
 
 
@@ -240,8 +242,8 @@ def _added(stack: Stack, weights: Matrix, origin: Vector) -> tuple[Matrix, Matri
     """``Σ w Λ`` (K, 12, 12) and ``Σ w (Λ (θ - origin) - g)`` (K, 12)."""
     gap = np.where(stack.seen, stack.answers - origin, 0.0)
     pulls = np.einsum("nij,nj->ni", stack.information, gap) - stack.gradient
-    information = weights @ stack.information.reshape(stack.count, -1)
-    return information.reshape(-1, SIZE, SIZE), weights @ pulls
+    information = np.einsum("kn,nij->kij", weights, stack.information)
+    return information, np.einsum("kn,ni->ki", weights, pulls)
 
 
 def _systems(stack: Stack, weights: Matrix, base: Sums) -> tuple[Matrix, Matrix, Vector, NDArray[np.bool_]]:
@@ -252,7 +254,7 @@ def _systems(stack: Stack, weights: Matrix, base: Sums) -> tuple[Matrix, Matrix,
     pull = pull + base.pull + base.information @ (base.origin - origin)
     prior, mean = prior_of(stack, weights, base)
     solved = np.einsum("kii->ki", information) > 0.0
-    solved[:, 7:] &= prior[7:] > 0.0
+    solved[:, BIAS:] &= prior[BIAS:] > 0.0
     solved[:, SCALE] &= solved[:, RADIUS] & (prior[RADIUS] > 0.0)
     both = solved[:, :, None] & solved[:, None, :]
     held = np.where(solved, prior, 1.0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.fusion import RADIUS, SCALE, SIZE, Fused, Stack, Sums, deviation, fuse, majority, sums
+from siloscope.fusion import BIAS, RADIUS, SCALE, SIZE, Fused, Stack, Sums, deviation, fuse, majority, sums
 
 SHORTEST = 3
 """A move needs this many agreeing frames on both sides; fewer are bad frames."""
@@ -30,8 +30,9 @@ FEW_STARTS = 4
 GRID = 16
 """Places tried at a time."""
 
-MOVING = (0, 1, 2, 3, 6)
-"""Parameters that a move changes: the pose, and the apex' depth below the camera."""
+MOVING = (0, 1, 2, 3, 6, 10, 11)
+"""Parameters that a move changes: the pose, the apex' depth below the camera, and the ovality's azimuth, which is
+counted from the camera."""
 
 STAYING = (4, 5, 7, 8, 9)
 """Parameters that it does not: radius, cone slope, depth bias."""
@@ -124,35 +125,39 @@ def _contrast(sides: list[Sums], excess: float) -> tuple[NDArray[np.float64], fl
     may differ. So what all frames have in common does not blur the comparison.
     """
     origin = sides[0].origin
-    moving = len(MOVING)
-    size = 2 * moving + len(STAYING)
-    system, spread, pull = np.zeros((size, size)), np.zeros((size, size)), np.zeros(size)
-    for number, side in enumerate(sides):
-        place = np.zeros((SIZE, size))
-        place[MOVING, np.arange(moving) + number * moving] = 1.0
-        place[STAYING, np.arange(2 * moving, size)] = 1.0
+    places = [_place(number) for number in range(2)]
+    system, spread = np.zeros((_SIZE, _SIZE)), np.zeros((_SIZE, _SIZE))
+    pull, held, wanted = np.zeros(_SIZE), np.zeros(_SIZE), np.zeros(_SIZE)
+    for side, place in zip(sides, places, strict=True):
         system += place.T @ side.information @ place
         spread += place.T @ (excess * (side.noise + side.weight * side.shared)) @ place
         pull += place.T @ (side.pull + side.information @ (side.origin - origin))
-    for k, column in zip(STAYING, range(2 * moving, size), strict=True):
-        held, mean = _prior(sides, k)
-        system[column, column] += held
-        spread[column, column] += held
-        pull[column] += held * (mean - origin[k])
-        if k >= SCALE - 1 and (held == 0.0 or (k == SCALE and _prior(sides, RADIUS)[0] == 0.0)):
-            for matrix in (system, spread):
-                matrix[column] = matrix[:, column] = 0.0
-            pull[column] = 0.0
-    return _stepped(system, spread, pull, moving)
+        prior = np.where(_SHARED_PRIOR, side.prior_information, 0.0) @ place
+        wanted = np.where(prior > held, (side.prior_mean - origin) @ place, wanted)
+        held = np.maximum(held, prior)
+    pinned = (np.concatenate([MOVING, MOVING, STAYING]) >= BIAS) & (held == 0.0)
+    pinned[-len(STAYING) + STAYING.index(SCALE)] |= held[2 * len(MOVING)] == 0.0  # no radius, no scale
+    system, spread = system + np.diag(held), spread + np.diag(held)
+    system[pinned] = system[:, pinned] = spread[pinned] = spread[:, pinned] = 0.0
+    return _stepped(system, spread, np.where(pinned, 0.0, pull + held * wanted))
 
 
-def _prior(sides: list[Sums], k: int) -> tuple[float, float]:
-    """Information and mean of the prior on a parameter that both sides share."""
-    return max((float(side.prior_information[k]), float(side.prior_mean[k])) for side in sides)
+_SIZE = 2 * len(MOVING) + len(STAYING)
+
+_SHARED_PRIOR = np.arange(SIZE) >= RADIUS
+"""Gravity is a prior on the pose of its own time, and so none on a step of it."""
+
+
+def _place(side: int) -> NDArray[np.float64]:
+    """Which columns of the two sides' common equations a side's parameters are."""
+    place = np.zeros((SIZE, _SIZE))
+    place[MOVING, np.arange(len(MOVING)) + side * len(MOVING)] = 1.0
+    place[STAYING, np.arange(2 * len(MOVING), _SIZE)] = 1.0
+    return place
 
 
 def _stepped(
-    system: NDArray[np.float64], spread: NDArray[np.float64], pull: NDArray[np.float64], moving: int
+    system: NDArray[np.float64], spread: NDArray[np.float64], pull: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], float]:
     scale = np.sqrt(np.diag(system))
     scale[scale == 0.0] = 1.0
@@ -160,7 +165,7 @@ def _stepped(
     inverse = inverse / scale[:, None] / scale[None, :]
     difference = np.zeros((4, len(system)))
     difference[:, :4] = -np.eye(4)
-    difference[:, moving : moving + 4] = np.eye(4)
+    difference[:, len(MOVING) : len(MOVING) + 4] = np.eye(4)
     reading = difference @ inverse
     step = reading @ pull
     covariance = reading @ spread @ reading.T

@@ -1,0 +1,76 @@
+"""How far off the answers are: PC average distance (Eq. 11) over the paper's silos and unseen ones.
+
+python -m benchmarks.accuracy --write
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from benchmarks import trials
+from benchmarks.trials import DIAMETER, KNOWN, LIDAR_PROFILE, NOTHING, Knowledge
+
+from siloscope.scene import Feed, Scene
+
+GAUSSIAN = Feed("gaussian", 0.1)
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table: which frames, what is known, and what must be reached (median and worst, mm)."""
+
+    name: str
+    feed: Feed
+    knowledge: Knowledge
+    median: float
+    worst: float
+    perturbed: bool = True
+    big: bool = False
+
+    def scenes(self, seeds: range) -> list[tuple[str, Scene]]:
+        """Its scenes, with their names."""
+        if self.big:
+            return trials.big_silos(seeds, self.feed)
+        return trials.silos(seeds, self.feed, perturbed=self.perturbed)
+
+
+ROWS = (
+    Row("perfect", GAUSSIAN, NOTHING, 0.05, 0.15, perturbed=False),
+    Row("perturbed, profile known", GAUSSIAN, KNOWN, 0.15, 0.6),
+    Row("the same, funnel feed at 45 %", Feed("funnel", 0.45), KNOWN, 0.6, 3.0),
+    Row("the same, off-centre rathole in lumpy tilted feed, 30 %", Feed("rathole+lumpy+tilted", 0.3), KNOWN, 0.6, 3.0),
+    Row("perturbed, profile unknown, diameter known", GAUSSIAN, DIAMETER, 2.0, 6.0),
+    Row("perturbed, nothing known", GAUSSIAN, NOTHING, 12.0, 30.0),
+    Row("radius 6–12 m, LiDAR-like", GAUSSIAN, Knowledge("profile known", LIDAR_PROFILE), 1.0, 5.0, big=True),
+)
+
+
+def measured(row: Row, scene: Scene) -> tuple[float, str | None]:
+    """PC average distance in mm and the reason of a refusal."""
+    frame = scene.render()
+    estimate = row.knowledge.locate(frame)
+    return trials.distance(frame, estimate), estimate.reason
+
+
+def main() -> None:
+    """Prints the table, and with --list every frame; with --write puts it into the manual."""
+    options = trials.arguments(__doc__, silos=30, first=100, row=-1)
+    seeds = range(options.first, options.first + options.silos)
+    lines = []
+    for row in ROWS if options.row < 0 else (ROWS[options.row],):
+        scenes = row.scenes(seeds)
+        found = list(trials.each([s for _, s in scenes], lambda s, r=row: measured(r, s), options.jobs, row.name))
+        for (name, _), (gap, reason) in zip(scenes, found, strict=True):
+            if options.list or reason or gap > row.worst:
+                print(f"  {name}: {reason or f'{gap:.3f} mm'}")
+        gaps = np.array([gap for gap, reason in found if reason is None])
+        refused = len(found) - len(gaps)
+        numbers = (f"{np.median(gaps):.3f}", f"{row.median:g}", f"{gaps.max():.3f}", f"{row.worst:g}")
+        lines.append((row.name, len(found), *numbers, refused))
+    head = ("frames", "silos", "median, mm", "goal", "worst, mm", "goal", "refused")
+    trials.publish("accuracy", trials.table(head, lines), options.write, "benchmarks.accuracy")
+
+
+if __name__ == "__main__":
+    main()
