@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import sqlite3
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import siloscope.frames
 from bags import Maker
 from data import make_realsense as made
 from siloscope import Camera, InputError, UsageError
+from siloscope.cli import main
 from siloscope.frames import realsense
 from siloscope.frames.rosbag1 import Rosbag1
 
@@ -90,6 +92,14 @@ def test_d435_of_2018_has_no_unit_after_its_images() -> None:
     assert source.provenance["device"] == "Intel RealSense D435"
     assert source.provenance["firmware"] == "05.09.14.00"
     assert frames[0].timestamp == pytest.approx(1534232519.732935547)
+
+
+def test_d435_in_an_office_corner_is_refused_with_a_reason(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["locate", str(realdata.path(*D435)), "--sensor", "realsense-d435", "--json"]) == 4
+    document = json.loads(capsys.readouterr().out)
+    assert document["status"] == "refused"
+    assert document["reason"]
+    assert document["r_x"] is None
 
 
 def test_extrinsics_are_rotations_from_the_reference_to_the_stream() -> None:
