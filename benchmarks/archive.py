@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import os
+import resource
 import shutil
 import signal
 import tempfile
@@ -165,6 +166,24 @@ def survivors(store: Store, folder: Path, kills: int) -> str:
     return f"{good} of {kills}"
 
 
+def after_full_disk(store: Store, folder: Path) -> str:
+    """How many of ten frames can be read after the eleventh was cut off by a disk that is full."""
+    path, few = folder / "full", list(np.random.default_rng(0).integers(0, 4000, (10, 480, 640), dtype=np.uint16))
+    os.waitpid(in_child(lambda: append_to_full_disk(store, path, few)), 0)
+    for count in range(len(few), 0, -1):
+        reader = in_child(lambda count=count: check_readable(store, path, few, count))
+        if os.waitstatus_to_exitcode(os.waitpid(reader, 0)[1]) == 0:
+            return f"{count} of {len(few)}"
+    return f"0 of {len(few)}"
+
+
+def append_to_full_disk(store: Store, path: Path, few: list[Depth]) -> None:
+    exhaust(store.add(path, few))
+    limit = 1000 + (path.stat().st_size if path.is_file() else 0)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
+    exhaust(store.add(path, few[:1]))
+
+
 def in_child(work: Callable[[], Any]) -> int:
     """Runs something in a process of its own, silently; gives its number."""
     child = os.fork()
@@ -185,11 +204,11 @@ def write_endlessly(store: Store, path: Path, few: list[Depth], pipe: int) -> No
 def check_readable(store: Store, path: Path, few: list[Depth], done: int) -> None:
     frames = list(store.read(path))
     assert len(frames) >= done
-    assert all(np.array_equal(frame, few[n % 4]) for n, frame in enumerate(frames[:done]))
+    assert all(np.array_equal(frame, few[n % len(few)]) for n, frame in enumerate(frames[:done]))
 
 
 def row(store: Store, frames: list[Depth], folder: Path, kills: int) -> str:
-    alive = survivors(store, folder, kills)
+    alive, spared = survivors(store, folder, kills), after_full_disk(store, folder)
     path = folder / "store"
     count = len(frames)
     write = best_ms(lambda: exhaust(store.add(path, frames)), count, 1)
@@ -197,7 +216,7 @@ def row(store: Store, frames: list[Depth], folder: Path, kills: int) -> str:
     assert all(np.array_equal(*pair) for pair in zip(frames, store.read(path), strict=True))
     read = best_ms(lambda: exhaust(store.read(path)), count)
     append = best_ms(lambda: exhaust(store.add(path, frames[:1])), 1, 3)
-    return f"| {store.name} | {kilobytes:.0f} | {write:.1f} | {read:.2f} | {append:.0f} | {alive} |"
+    return f"| {store.name} | {kilobytes:.0f} | {write:.1f} | {read:.2f} | {append:.0f} | {alive} | {spared} |"
 
 
 def main() -> None:
@@ -206,8 +225,10 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=100)
     options = parser.parse_args()
     frames = raw_frames(options.frames)
-    print("| store | kB a frame | ms to write | ms to read | ms to open and append one | whole after a kill |")
-    print("|---|---|---|---|---|---|")
+    print(
+        "| store | kB a frame | ms to write | ms to read | ms to open and append one | whole after a kill | frames left by a full disk |"
+    )
+    print("|---|---|---|---|---|---|---|")
     for store in STORES:
         folder = Path(tempfile.mkdtemp())
         print(row(store, frames, folder, options.kills), flush=True)

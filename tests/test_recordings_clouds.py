@@ -14,6 +14,7 @@ import realdata
 import recording_files
 import siloscope.frames
 from siloscope import Camera, Frame, InputError
+from siloscope.cli import main
 
 CLOUDS = "formats_las_e57"
 MUG = ("azure_kinect_mkv_mug", "recording.mkv")
@@ -23,6 +24,14 @@ def only_frame(path: Path, **options: Any) -> Frame:
     with siloscope.frames.open(path, **options) as source:
         (frame,) = source
     return frame
+
+
+@pytest.mark.parametrize("name", recording_files.MAKERS)
+def test_info_shows_every_recording_and_cloud(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / name
+    path.write_bytes(recording_files.MAKERS[name]())
+    assert main(["info", str(path), "--check"]) == 0
+    assert "frame" in capsys.readouterr().out
 
 
 # --- LAS and LAZ

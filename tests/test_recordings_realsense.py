@@ -5,6 +5,8 @@ from __future__ import annotations
 import contextlib
 import json
 import sqlite3
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -49,35 +51,29 @@ def test_gravity_points_against_the_accelerometer(path: Path) -> None:
     np.testing.assert_allclose(frame.gravity, -np.array(made.ACCELERATION), rtol=1e-6)
 
 
-@pytest.mark.parametrize("suffix", ["bag", "db3"])
-@pytest.mark.parametrize("compressed", [True, False])
+@pytest.mark.parametrize(("suffix", "compressed"), [("bag", True), ("db3", True), ("db3", False)])
 def test_bit_for_bit_what_the_sdk_plays(tmp_path: Path, suffix: str, compressed: bool) -> None:
-    rs = sdk()
+    sdk()
     path = DATA / "realsense.bag"
     if suffix == "db3":
-        made.record(str(path := tmp_path / "recorded.db3"), compressed)
-    played = _played(rs, path)
+        path = tmp_path / "recorded.db3"
+        by_the_sdk("record", str(path), *([] if compressed else ["raw"]))
+    by_the_sdk("play", str(path), str(tmp_path / "played.npz"))
+    with np.load(tmp_path / "played.npz") as played:
+        units, depth = played["units"], played["depth"]
     frames = list(siloscope.frames.open(path))
-    assert len(frames) == len(played) == 3
-    for frame, (unit, depth) in zip(frames, played, strict=True):
-        assert np.array_equal(frame.depth, depth)
-        assert np.float32(frame.depth_unit) == np.float32(unit)
+    assert np.array_equal([frame.depth for frame in frames], depth)
+    assert np.array_equal(np.float32([frame.depth_unit for frame in frames]), np.float32(units))
 
 
-def _played(rs: Any, path: Path) -> list[tuple[float, Any]]:
-    device = rs.context().load_device(str(path))
-    device.set_real_time(False)
-    sensor, queue = device.query_sensors()[0], rs.frame_queue(50)
-    sensor.open(sensor.get_stream_profiles()[0])
-    sensor.start(queue)
-    frames = []
-    while len(frames) < 3:
-        arrived, frame = queue.try_wait_for_frame(5000)
-        assert arrived
-        frames.append((frame.as_depth_frame().get_units(), np.asanyarray(frame.get_data()).copy()))
-    sensor.stop()
-    sensor.close()
-    return frames
+def by_the_sdk(*command: str) -> None:
+    """Runs the SDK in a process of its own, again where it crashes: its clean-up is not what is tested."""
+    for _ in range(5):
+        done = subprocess.run([sys.executable, made.__file__, *command], capture_output=True, timeout=60, check=False)
+        if done.returncode == 0:
+            return
+        Path(command[-1] if command[0] == "play" else command[1]).unlink(missing_ok=True)
+    pytest.fail(f"the SDK can't {' '.join(command)}: {done.stderr.decode()}")
 
 
 def test_d435_of_2018_has_no_unit_after_its_images() -> None:
@@ -155,8 +151,10 @@ def _two_cameras(folder: Path, accel: tuple[float, float, float] = (0.0, 0.0, -9
 
 def test_two_depth_streams_ask_which(tmp_path: Path) -> None:
     path = _two_cameras(tmp_path)
+    source = siloscope.frames.open(path)
     with pytest.raises(InputError, match=r"--stream: device_0/sensor_0/Depth_0, device_1/sensor_0/Depth_0"):
-        siloscope.frames.open(path)
+        list(source)
+    assert [stream["chosen"] for stream in source.describe()["streams"]] == [False, False]
     frame = next(iter(siloscope.frames.open(path, stream="device_1")))
     assert frame.depth is not None
     assert frame.depth[0, 0] == 1001

@@ -14,6 +14,7 @@ import realdata
 import siloscope.frames
 from bags import START_NS, Maker, Message, png16, quantised
 from siloscope import Camera, Frame, InputError
+from siloscope.cli import main
 
 RAW = np.random.default_rng(3).integers(0, 65536, (48, 64), dtype=np.uint16)
 METRES = np.where(RAW % 7 == 0, 0, RAW / 20_000).astype(np.float32)
@@ -120,12 +121,16 @@ def test_raw_wins_over_the_same_topic_compressed(tmp_path: Path) -> None:
     assert only_frame(write(tmp_path, "ros2", messages)).provenance["stream"] == "/depth/image_raw"
 
 
-def test_two_depth_topics_ask_which(tmp_path: Path) -> None:
+def test_two_depth_topics_ask_which(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     maker = Maker(1)
     topics = ["/camera/depth/image_rect_raw", "/camera/aligned_depth_to_color/image_raw"]
     path = write(tmp_path, "ros1", [(topic, START_NS, maker.image(RAW, "16UC1")) for topic in topics])
     with pytest.raises(InputError, match=f"--stream: {', '.join(topics)}"):
-        siloscope.frames.open(path)
+        siloscope.frames.open(path)[0]
+    assert main(["locate", str(path)]) == 3
+    assert main(["info", str(path)]) == 0
+    told = capsys.readouterr().out
+    assert all(topic in told for topic in topics)
     assert only_frame(path, stream="aligned").provenance["stream"] == topics[1]
 
 

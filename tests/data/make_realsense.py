@@ -1,11 +1,14 @@
-"""Makes the RealSense recordings in this folder with the maker's own SDK and no camera.
+"""Makes the RealSense recordings in this folder, and plays them, with the maker's own SDK and no camera.
 
-`pip install pyrealsense2==2.56.5.9235`, then ``python make_realsense.py realsense.bag``; with 2.59.1.11053 likewise
-``realsense.db3``. The depth is that of `depth_frames`, in units of a quarter of a millimetre.
+`pip install pyrealsense2==2.56.5.9235`, then ``python make_realsense.py record realsense.bag``; with 2.59.1.11053
+likewise ``realsense.db3``. The depth is that of `depth_frames`, in units of a quarter of a millimetre.
+``play RECORDING OUT.npz`` saves the frames as the SDK plays them. The SDK crashes now and then while it cleans up,
+so this ends without cleaning up.
 """
 
 from __future__ import annotations
 
+import os
 import sys
 import time
 from typing import Any
@@ -85,5 +88,30 @@ def _stamped(rs: Any, frame: Any, profile: Any, number: int) -> Any:
     return frame
 
 
+def play(path: str, out: str) -> None:
+    """Saves units and depth of all frames as the SDK plays them."""
+    import pyrealsense2 as rs
+
+    device = rs.context().load_device(path)
+    device.set_real_time(False)
+    sensor, queue = device.query_sensors()[0], rs.frame_queue(50)
+    sensor.open(sensor.get_stream_profiles()[0])
+    sensor.start(queue)
+    units, frames = [], []
+    while len(frames) < len(depth_frames()):
+        arrived, frame = queue.try_wait_for_frame(5000)
+        if not arrived:
+            os._exit(1)
+        units.append(frame.as_depth_frame().get_units())
+        frames.append(np.asanyarray(frame.get_data()).copy())
+    np.savez(out, units=units, depth=frames)
+
+
 if __name__ == "__main__":
-    record(sys.argv[1])
+    what, recording, *rest = sys.argv[1:]
+    if what == "record":
+        record(recording, compressed=rest != ["raw"])
+    else:
+        play(recording, rest[0])
+    sys.stdout.flush()
+    os._exit(0)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from siloscope.frames.recorded import RecordedSource
+from siloscope.frames.recorded import Undecided
 from siloscope.frames.recording import Recording
-from siloscope.frames.source import Options
+from siloscope.frames.source import FrameSource, Options
+from siloscope.frames.streams import SeveralStreams
 
 
-def source(path: Path, format: str, options: Options, recording: Recording) -> RecordedSource:
-    """The source of frames for a recording, by its topics; closes the recording where it can't be used."""
+def source(path: Path, format: str, options: Options, recording: Recording) -> FrameSource:
+    """The source of frames for a recording, by its topics; closes the recording where none can be read."""
     from siloscope.frames import orbbec, realsense, ros
 
     try:
@@ -19,6 +20,9 @@ def source(path: Path, format: str, options: Options, recording: Recording) -> R
         if orbbec.is_orbbec(recording):
             return orbbec.OrbbecSource(path, f"orbbec-{format}", options, recording)
         return ros.RosSource(path, format, options, recording)
+    except SeveralStreams as why:
+        recording.close()
+        return Undecided(path, format, options, why.streams, why)
     except BaseException:
         recording.close()
         raise

@@ -262,7 +262,7 @@ class E57Source(FrameSource):
 
     def _streams(self) -> list[dict[str, Any]]:
         kinds = {"name": "points", "kind": "points", "dtype": "float64", "chosen": True}
-        return [{**kinds, "name": scan.name, "size": scan.size, "frames": 1} for scan in self.scans]
+        return [{**kinds, "name": scan.name, "size": [scan.size], "frames": 1} for scan in self.scans]
 
     def close(self) -> None:
         """Lets go of the file."""

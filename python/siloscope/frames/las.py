@@ -168,7 +168,7 @@ class LasSource(FrameSource):
         return 1
 
     def _streams(self) -> list[dict[str, Any]]:
-        stream = {"name": "points", "kind": "points", "size": self.header.points, "dtype": "float64"}
+        stream = {"name": "points", "kind": "points", "size": [self.header.points], "dtype": "float64"}
         return [{**stream, "frames": 1, "chosen": True}]
 
 

@@ -10,9 +10,8 @@ from typing import BinaryIO
 
 from siloscope.errors import InputError
 from siloscope.frames.dialects import source
-from siloscope.frames.recorded import RecordedSource
 from siloscope.frames.recording import Entry, Recording, Topic, decompress, wire
-from siloscope.frames.source import Format, Options
+from siloscope.frames.source import Format, FrameSource, Options
 from siloscope.frames.wire import Wire
 
 MAGIC = b"\x89MCAP0\r\n"
@@ -136,7 +135,7 @@ def _records(chunk: bytes, cut: bool) -> Iterator[tuple[int, int, int]]:
         raise InputError("a chunk of messages is damaged; frames before are read")
 
 
-def _open(path: Path, options: Options) -> RecordedSource:
+def _open(path: Path, options: Options) -> FrameSource:
     return source(path, "mcap", options, Mcap(path))
 
 

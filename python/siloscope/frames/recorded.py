@@ -15,6 +15,21 @@ from siloscope.frames.source import FrameSource, Item, Options
 from siloscope.frames.streams import Stream, choose, described
 
 
+class Undecided(FrameSource):
+    """A recording with several streams: `describe` lists them, iterating asks which."""
+
+    def __init__(self, path: Path, format: str, options: Options, streams: Sequence[Stream], why: InputError) -> None:
+        super().__init__(path, format, options)
+        self.streams, self.why = streams, why
+        self.problems = [str(why)]
+
+    def _items(self) -> Iterator[Item]:
+        raise self.why
+
+    def _streams(self) -> list[dict[str, Any]]:
+        return described(self.streams, None)
+
+
 class RecordedSource(FrameSource):
     """Frames of one stream of a recording; where it breaks off, what came before is given and `problems` says so."""
 

@@ -8,9 +8,8 @@ from pathlib import Path
 from siloscope.errors import InputError
 from siloscope.frames.dialects import source
 from siloscope.frames.mcap import Mcap
-from siloscope.frames.recorded import RecordedSource
 from siloscope.frames.recording import Entry, Recording, Topic
-from siloscope.frames.source import Format, Options
+from siloscope.frames.source import Format, FrameSource, Options
 from siloscope.frames.sqlite_bag import SqliteBag
 from siloscope.frames.wire import Wire
 
@@ -56,7 +55,7 @@ class Joined(Recording):
             part.close()
 
 
-def _open(path: Path, options: Options) -> RecordedSource:
+def _open(path: Path, options: Options) -> FrameSource:
     files = parts_of(path)
     if not files:
         raise InputError(f"{path}: the ROS 2 bag has no .db3 or .mcap file; unpack .zstd files first")

@@ -13,9 +13,8 @@ from typing import BinaryIO, NamedTuple
 
 from siloscope.errors import InputError
 from siloscope.frames.dialects import source
-from siloscope.frames.recorded import RecordedSource
 from siloscope.frames.recording import Entry, Recording, Topic, decompress, wire
-from siloscope.frames.source import Format, Options
+from siloscope.frames.source import Format, FrameSource, Options
 from siloscope.frames.wire import Wire
 
 MAGIC = b"#ROSBAG V2.0\n"
@@ -182,7 +181,7 @@ def _number(fields: Fields, name: str, code: str) -> int:
         raise InputError(f"a record has no {name}; frames before are read") from None
 
 
-def _open(path: Path, options: Options) -> RecordedSource:
+def _open(path: Path, options: Options) -> FrameSource:
     return source(path, "bag", options, Rosbag1(path))
 
 

@@ -8,9 +8,8 @@ from urllib.parse import quote
 
 from siloscope.errors import InputError
 from siloscope.frames.dialects import source
-from siloscope.frames.recorded import RecordedSource
 from siloscope.frames.recording import MAX_CHUNK, Entry, Recording, Topic, wire
-from siloscope.frames.source import Format, Options
+from siloscope.frames.source import Format, FrameSource, Options
 from siloscope.frames.wire import Wire
 
 MAGIC = b"SQLite format 3\0"
@@ -83,7 +82,7 @@ def _text(data: bytes) -> str:
     return data.decode("utf-8", "replace")
 
 
-def _open(path: Path, options: Options) -> RecordedSource:
+def _open(path: Path, options: Options) -> FrameSource:
     return source(path, "db3", options, SqliteBag(path))
 
 

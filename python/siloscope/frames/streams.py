@@ -35,13 +35,23 @@ class Stream:
     dtype: str | None = None
 
 
+class SeveralStreams(InputError):
+    """Several streams and nothing that says which is meant."""
+
+    def __init__(self, message: str, streams: Sequence[Stream]) -> None:
+        super().__init__(message)
+        self.streams = streams
+
+
 def choose(name: str, streams: Sequence[Stream], wanted: str | None) -> Stream:
     """The stream named `wanted` (or a part of a name that fits only one); without, the only depth stream.
 
     Raises
     ------
     InputError
-        Where there is none, or several and nothing says which.
+        Where there is none.
+    SeveralStreams
+        Where there are several and nothing says which.
     UsageError
         For a name that fits none or several.
     """
@@ -51,9 +61,8 @@ def choose(name: str, streams: Sequence[Stream], wanted: str | None) -> Stream:
         return _named(name, streams, wanted)
     candidates = [stream for stream in streams if stream.kind == "depth"] or list(streams)
     if len(candidates) > 1:
-        raise InputError(
-            f"{name}: {len(candidates)} {candidates[0].kind} streams; choose one with --stream: {_listed(candidates)}"
-        )
+        kind, names = candidates[0].kind, _listed(candidates)
+        raise SeveralStreams(f"{name}: {len(candidates)} {kind} streams; choose one with --stream: {names}", streams)
     return candidates[0]
 
 
@@ -70,13 +79,13 @@ def _listed(streams: Sequence[Stream]) -> str:
     return ", ".join(stream.name for stream in streams)
 
 
-def described(streams: Sequence[Stream], chosen: Stream) -> list[dict[str, Any]]:
+def described(streams: Sequence[Stream], chosen: Stream | None) -> list[dict[str, Any]]:
     """The streams as plain data, for `FrameSource.describe`."""
     return [
         {
             "name": stream.name,
             "kind": stream.kind,
-            "size": stream.size,
+            "size": [stream.size] if isinstance(stream.size, int) else stream.size,
             "dtype": stream.dtype,
             "frames": len(stream.topic.entries),
             "chosen": stream is chosen,
