@@ -225,9 +225,8 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=100)
     options = parser.parse_args()
     frames = raw_frames(options.frames)
-    print(
-        "| store | kB a frame | ms to write | ms to read | ms to open and append one | whole after a kill | frames left by a full disk |"
-    )
+    titles = ("store", "kB a frame", "ms to write", "ms to read", "ms to open and append one", "whole after a kill")
+    print("| " + " | ".join((*titles, "frames left by a full disk")) + " |")
     print("|---|---|---|---|---|---|---|")
     for store in STORES:
         folder = Path(tempfile.mkdtemp())
