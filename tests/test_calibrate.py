@@ -126,6 +126,23 @@ def test_old_frames_are_added_up_without_loss(monkeypatch: pytest.MonkeyPatch) -
     same(at_once, found, share=0.2, variance=0.2)
 
 
+def test_frames_since_a_move_stay_used_when_they_are_added_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys.modules["siloscope.calibrate"], "KEPT", 2)
+    after = [located(scene) for scene in discharge(moved(d_tx=0.01), 5, 0.3, 0.1)]
+    found = calibrate(after[4:], continue_from=calibrate([*sequence(), *after[:4]]))
+    assert found.moved_at is not None
+    assert [record.status for record in found.frames] == ["before-move"] * len(sequence()) + ["used"] * 5
+
+
+def test_gravity_counts_once_and_each_frames_own_reading_is_averaged() -> None:
+    depths = [np.nan_to_num(scene.render().measured).astype(np.float32) for scene in discharge(SILO3, 3, 0.3, 0.1)]
+    down = SILO3.pose.axis_direction
+    free = calibrate(depths, camera=SILO3.camera, sensor="orbbec-astra-s")
+    held = calibrate(depths, camera=SILO3.camera, sensor="orbbec-astra-s", gravity=down)
+    same(free, held, share=0.05, variance=0.05)
+    assert held.config["gravity"] == pytest.approx(down.tolist())
+
+
 def test_the_frame_from_which_on_the_camera_has_moved_is_found() -> None:
     after = moved(d_rx=0.002, d_tx=0.003)
     frames = [*sequence(), *(located(scene) for scene in discharge(after, 4, 0.3, 0.1))]

@@ -242,7 +242,6 @@ class _History:
     evidence: tuple[tuple[int, SurfaceEvidence], ...] = ()
     earlier: Sums | None = None
     moves: tuple[Move, ...] = ()
-    poses: tuple[Estimate, ...] = ()
 
     @classmethod
     def of(cls, before: Calibration | None) -> _History:
@@ -342,13 +341,13 @@ def _judged(history: _History, fused: Fused) -> tuple[FrameRecord, ...]:
         number: (float(weight), float(deviation))
         for (number, _), weight, deviation in zip(history.evidence, fused.weights, fused.deviations, strict=True)
     }
-    first = min(verdict) if history.moves else 0
+    first = history.moves[-1].index if history.moves else 0
 
     def judged(record: FrameRecord) -> FrameRecord:
         if record.index in verdict:
             weight, deviation = verdict[record.index]
             return replace(record, status="used" if weight > 0.0 else "rejected", weight=weight, deviation=deviation)
-        if record.pose is not None and record.index < first and history.moves:
+        if record.pose is not None and record.index < first:
             return replace(record, status="before-move", weight=0.0, deviation=None)
         return record
 
