@@ -214,3 +214,15 @@ def test_the_users_camera_and_unit_win() -> None:
     camera = Camera(64, 48, 57.0, 57.0, 31.5, 23.5)
     frame = next(iter(siloscope.frames.open(FIXTURES[0], camera=camera, depth_unit=0.0005)))
     assert (frame.camera, frame.depth_unit) == (camera, 0.0005)
+
+
+def test_a_camera_message_cut_short_names_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "short.db3"
+    path.write_bytes((DATA / "realsense.db3").read_bytes())
+    base = sqlite3.connect(path)
+    with base:
+        topic = "SELECT id FROM topics WHERE name LIKE '%Depth_0/camera_info'"
+        base.execute(f"UPDATE messages SET data = substr(data, 1, 6) WHERE topic_id = ({topic})")
+    base.close()
+    with pytest.raises(InputError, match=r"short\.db3: message ends"):
+        siloscope.frames.open(path)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from siloscope.errors import InputError
 from siloscope.frames.recorded import Undecided
 from siloscope.frames.recording import Recording
 from siloscope.frames.source import FrameSource, Options
@@ -23,6 +24,9 @@ def source(path: Path, format: str, options: Options, recording: Recording) -> F
     except SeveralStreams as why:
         recording.close()
         return Undecided(path, format, options, why.streams, why)
+    except InputError as error:
+        recording.close()
+        raise error if recording.name in str(error) else InputError(f"{recording.name}: {error}") from None
     except BaseException:
         recording.close()
         raise
