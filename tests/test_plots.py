@@ -11,11 +11,10 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from siloscope import SiloGeometry, plots
-from siloscope.paper.metrics import LABELS
+from siloscope.paper.metrics import LABELS, camera_points
 from siloscope.paper.scenarios import scenario
 from siloscope.plots.directions import angles
 from siloscope.plots.profile import wall_distance
-from siloscope.region import frame_points
 from siloscope.scene import SimulatedFrame
 
 
@@ -26,7 +25,7 @@ def seen() -> SimulatedFrame:
 
 def cloud(seen: SimulatedFrame) -> tuple[np.ndarray, np.ndarray]:
     there = seen.measured_labels > 0
-    return frame_points(seen.frame())[there], seen.measured_labels[there]
+    return camera_points(seen.measured, seen.camera)[there], seen.measured_labels[there]
 
 
 def pixels(figure: Figure) -> np.ndarray:
