@@ -156,6 +156,13 @@ def _write_scaled(pye57: Any, path: Path, raw: Any, low: int, high: int) -> None
     image.close()
 
 
+def test_a_description_without_a_count_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cloud.e57"
+    path.write_bytes(recording_files.with_checksums(recording_files.e57().replace(b"recordCount", b"recordCxxxx")))
+    with pytest.raises(InputError, match=r"cloud\.e57: damaged description \('recordCount'\)"):
+        siloscope.frames.open(path)
+
+
 def test_a_wrong_checksum_is_refused_with_its_page() -> None:
     with pytest.raises(InputError, match="page 33 fails its checksum"):
         siloscope.frames.open(realdata.path(CLOUDS, "corrupt_crc.e57"))

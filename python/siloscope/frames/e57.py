@@ -108,7 +108,7 @@ def scans_of(name: str, root: Xml.Element) -> list[Scan]:
     data = _child(root, "data3D")
     try:
         return [_scan(number, element) for number, element in enumerate(data if data is not None else ())]
-    except (TypeError, ValueError, OverflowError, AttributeError) as error:
+    except (TypeError, ValueError, OverflowError, AttributeError, KeyError) as error:
         raise InputError(f"{name}: damaged description ({error}); export the file again") from None
 
 
