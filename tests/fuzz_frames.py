@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import re
+import resource
 import signal
 import struct
 import sys
@@ -67,6 +68,9 @@ BEST_RATIO = 1032
 """What deflate, the strongest compression read, can make of a byte."""
 FLOOR_BYTES = 16 << 20
 """Memory that reading may take whatever the file's size: buffers, headers, imported modules."""
+
+MOST_BYTES = 4 << 30
+"""Address space of the long run: a decoder of native code that asks for more ends the process, for all to see."""
 
 _WORDS = (b"0", b"-1", b"1", b"65536", b"2147483648", b"99999999999999", b"1e308", b"nan", b"", b"x" * 300)
 _VALUES = (0, 1, 0x7F, 0x80, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 0x7FFFFFFFFFFFFFFF)
@@ -210,6 +214,7 @@ def main() -> int:
     parser.add_argument("--name", choices=sorted(SEEDS), action="append", help="only this file")
     parser.add_argument("--seed", type=int, default=0)
     wanted = parser.parse_args()
+    resource.setrlimit(resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
     failures = 0
     for name in wanted.name or SEEDS:
         started = time.perf_counter()
