@@ -163,6 +163,14 @@ def test_a_description_without_a_count_is_refused(tmp_path: Path) -> None:
         siloscope.frames.open(path)
 
 
+def test_a_negative_count_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "cloud.e57"
+    negative = recording_files.e57().replace(b'recordCount="30"', b'recordCount="-3"')
+    path.write_bytes(recording_files.with_checksums(negative))
+    with pytest.raises(InputError, match="scan 0 has -3 points"):
+        siloscope.frames.open(path)
+
+
 def test_a_wrong_checksum_is_refused_with_its_page() -> None:
     with pytest.raises(InputError, match="page 33 fails its checksum"):
         siloscope.frames.open(realdata.path(CLOUDS, "corrupt_crc.e57"))

@@ -119,7 +119,10 @@ def _scan(number: int, element: Xml.Element) -> Scan:
     prototype = _child(points, "prototype")
     columns = tuple(_column(field) for field in (prototype if prototype is not None else ()))
     text = (label.text or "").strip() if label is not None else ""
-    return Scan(text or f"scan {number}", int(points.attrib["recordCount"]), int(points.attrib["fileOffset"]), columns)
+    size, at = (int(points.attrib[key]) for key in ("recordCount", "fileOffset"))
+    if size < 0 or at < 0:
+        raise ValueError(f"scan {number} has {size} points at {at}")
+    return Scan(text or f"scan {number}", size, at, columns)
 
 
 def _column(field: Xml.Element) -> Column:
