@@ -7,7 +7,7 @@ use numpy::{
 use pyo3::prelude::*;
 use siloscope::axis::{self, Wall};
 use siloscope::backproject::{DepthImage, Depths};
-use siloscope::candidates::{self, View};
+use siloscope::candidates::{self, Candidate, View};
 use siloscope::neighbours::Neighbours;
 use siloscope::shape_tensor::ShapeTensor;
 use siloscope::workers::Workers;
@@ -196,11 +196,20 @@ fn select_candidates<'py>(
 /// Axis direction X and the rising eigenvalues of S/n (Eq. 3).
 #[pyfunction]
 fn axis_direction(e1: Doubles) -> PyResult<([f64; 3], [f64; 3])> {
-    let direction = axis::axis_direction(vectors(&e1)?.into_iter());
+    let direction = axis::axis_direction(vectors(&e1)?);
     Ok((direction.x.into(), direction.spread))
 }
 
-/// Estimated axis points (M, 3): silo x and y, and the distance along X (Eq. 4).
+/// Axis direction X of the candidates' directions E1, in order of rising |k2|, and which of them agree with it.
+#[pyfunction]
+fn consistent_direction<'py>(py: Python<'py>, e1: Doubles, agreement: f64) -> PyResult<([f64; 3], Indices<'py>)> {
+    let candidate = |(index, e1)| Candidate { index, bent: f64::NAN, straight: f64::NAN, e1 };
+    let candidates: Vec<Candidate> = vectors(&e1)?.into_iter().enumerate().map(candidate).collect();
+    let (direction, kept) = axis::consistent_direction(&candidates, agreement);
+    Ok((direction.x.into(), kept.iter().map(|c| c.index as u32).collect::<Vec<_>>().into_pyarray(py)))
+}
+
+/// Estimated axis points (M, 2) in the silo's x and y (Eq. 4).
 #[pyfunction]
 fn axis_points<'py>(
     py: Python<'py>,
@@ -214,7 +223,8 @@ fn axis_points<'py>(
     same_length("normals", normals.len(), points.len())?;
     let walls: Vec<Wall> = points.into_iter().zip(normals).map(|(p, normal)| Wall { p, normal }).collect();
     let estimates = py.detach(|| axis::axis_points(&walls, &direction.into(), partners, &Workers::new(threads)));
-    to_array(py, &estimates.iter().map(|e| Vec3::new(e.at.x, e.at.y, e.along)).collect::<Vec<_>>())
+    let flat: Vec<f64> = estimates.iter().flat_map(|e| [e.at.x, e.at.y]).collect();
+    flat.into_pyarray(py).reshape([estimates.len(), 2])
 }
 
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -225,5 +235,6 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(shape_tensors, m)?)?;
     m.add_function(wrap_pyfunction!(select_candidates, m)?)?;
     m.add_function(wrap_pyfunction!(axis_direction, m)?)?;
+    m.add_function(wrap_pyfunction!(consistent_direction, m)?)?;
     m.add_function(wrap_pyfunction!(axis_points, m)?)
 }

@@ -9,7 +9,7 @@ pub enum View {
     /// From inside: walls bend towards the camera, k1 = 1/R (Property 5).
     #[default]
     Inside,
-    /// From outside: walls bend away, and it is the other principal curvature that is -1/R.
+    /// From outside: walls bend away from it, and it is the other principal curvature that is not 0 but -1/R.
     Outside,
     /// Unknown, or from several places at once.
     Either,
@@ -32,7 +32,7 @@ pub struct Candidate {
     pub index: usize,
     /// The principal curvature across the generatrix: k1 seen from inside, k2 from outside.
     pub bent: f64,
-    /// The one along it, which is 0 on cylinder and cone (Property 1).
+    /// The one along it, 0 on cylinder and cone (Property 1).
     pub straight: f64,
     /// The principal direction of `bent`, perpendicular to the axis (Property 3).
     pub e1: Vec3,
@@ -48,16 +48,17 @@ impl Candidate {
     }
 }
 
-/// The `share` of the points with the smallest |k2|, in that order, among those with a clear k1.
+/// The `share` with the smallest |k2|, in that order, of the points with a clear k1.
 ///
-/// Clear is a curvature whose radius is less than the extent of the cloud: a silo is seen from within its own radius,
-/// and flatter ground has no direction of curvature but noise.
+/// Clear is a radius of curvature below the extent of the cloud: a silo's radius is, and the direction in which flatter
+/// ground bends is noise. A share of these and not of all points keeps a frame that is mostly feed from filling up
+/// with it.
 pub fn select_candidates(points: &[Vec3], tensors: &[ShapeTensor], share: f64, view: View) -> Vec<Candidate> {
     let least = 1.0 / extent(points);
     let clear = |c: &Candidate| c.bent.abs() > least && view.allows(c.bent);
     let mut candidates: Vec<_> = tensors.iter().enumerate().map(|(i, t)| Candidate::new(i, t)).filter(clear).collect();
     candidates.sort_by(|a, b| a.straight.abs().total_cmp(&b.straight.abs()));
-    candidates.truncate((share * points.len() as f64).ceil() as usize);
+    candidates.truncate((share * candidates.len() as f64).ceil() as usize);
     candidates
 }
 

@@ -20,6 +20,8 @@ pub struct Settings {
     pub neighbours: usize,
     /// Share of the points kept as candidates.
     pub share: f64,
+    /// Robust standard deviations by which a candidate's E1 may be off; infinite to keep all.
+    pub agreement: f64,
     /// Partners s of each candidate in step 5.
     pub partners: usize,
     /// From which side the walls are seen.
@@ -30,7 +32,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { grid: 0.05, neighbours: 30, share: 0.3, partners: 50, view: View::Inside, threads: 1 }
+        Self { grid: 0.05, neighbours: 30, share: 0.5, agreement: 2.0, partners: 50, view: View::Inside, threads: 1 }
     }
 }
 
@@ -62,12 +64,14 @@ fn locate_in_cloud(cloud: &Cloud, settings: &Settings, workers: &Workers) -> Res
     lap();
     let candidates = candidates::select_candidates(points, &tensors, settings.share, settings.view);
     lap();
-    let direction = axis::axis_direction(candidates.iter().map(|c| c.e1));
+    let (direction, kept) = axis::consistent_direction(&candidates, settings.agreement);
     lap();
-    let walls: Vec<Wall> = candidates.iter().map(|c| Wall { p: points[c.index], normal: normal[c.index] }).collect();
+    let walls: Vec<Wall> = kept.iter().map(|c| Wall { p: points[c.index], normal: normal[c.index] }).collect();
     let estimates = axis::axis_points(&walls, &direction.x, settings.partners, workers);
-    let a = axis::axis_point(&estimates, &direction.x);
+    let a = axis::axis_point(&estimates);
     lap();
+    let turn = SiloPose::from_axis(&direction.x, &Vec3::zeros()).rotation();
+    let a = a.map(|a| turn.transpose() * Vec3::new(a.x, a.y, 0.0));
     let pose = a.map(|a: Vec3| SiloPose::from_axis(&direction.x, &a));
     Ok((pose, times))
 }

@@ -24,12 +24,17 @@ pub struct ShapeTensor {
 /// A neighbour whose normal is nearly perpendicular to the point's own is on another piece of surface: it is left out.
 const STEEPEST: f64 = 0.1;
 
+/// Weight of a position equation: its neighbour's normal is a mean over many points and so the better measurement.
+const POSITION_WEIGHT: f64 = 0.5;
+/// What it makes of products of such equations.
+const W2: f64 = POSITION_WEIGHT * POSITION_WEIGHT;
+
 /// Shape tensor of every point.
 ///
 /// In local coordinates with the normal as z the surface is z = a/2 x² + b xy + c/2 y² + d x³ + e x²y + f xy² + g y³.
 /// Each neighbour gives one equation for its position and two for its normal; the seven unknowns follow by least
 /// squares and the tensor is ((a, b), (b, c)). Lengths are in units of the distance to the farthest neighbour, so
-/// that position and normal equations weigh alike at every scale.
+/// that the equations weigh alike at every scale.
 pub fn shape_tensors(
     points: &[Vec3],
     neighbours: &Neighbours,
@@ -92,14 +97,15 @@ impl Equations {
     fn add(&mut self, x: f64, y: f64, z: f64, [p, q]: [f64; 2]) {
         let (xx, xy, yy) = (x * x, x * y, y * y);
         let cubic = [xx * x, xx * y, x * yy, yy * y];
+        let wz = W2 * z;
         let rows = [
-            0.5 * xx * z + x * p,
-            xy * z + y * p + x * q,
-            0.5 * yy * z + y * q,
-            cubic[0] * z + 3.0 * xx * p,
-            cubic[1] * z + 2.0 * xy * p + xx * q,
-            cubic[2] * z + yy * p + 2.0 * xy * q,
-            cubic[3] * z + 3.0 * yy * q,
+            0.5 * xx * wz + x * p,
+            xy * wz + y * p + x * q,
+            0.5 * yy * wz + y * q,
+            cubic[0] * wz + 3.0 * xx * p,
+            cubic[1] * wz + 2.0 * xy * p + xx * q,
+            cubic[2] * wz + yy * p + 2.0 * xy * q,
+            cubic[3] * wz + 3.0 * yy * q,
         ];
         let [c0, c1, c2, c3] = cubic;
         add(&mut self.right, rows);
@@ -117,10 +123,10 @@ impl Equations {
         let mut a = SMatrix::<f64, 7, 7>::zeros();
         let quadratic = [0.5, 1.0, 0.5];
         for (i, fi) in quadratic.iter().enumerate() {
-            (0..=i).for_each(|j| a[(i, j)] = fi * quadratic[j] * m4[i + j]);
-            (0..4).for_each(|j| a[(3 + j, i)] = fi * m5[i + j]);
+            (0..=i).for_each(|j| a[(i, j)] = W2 * fi * quadratic[j] * m4[i + j]);
+            (0..4).for_each(|j| a[(3 + j, i)] = W2 * fi * m5[i + j]);
         }
-        (0..4).for_each(|i| (0..=i).for_each(|j| a[(3 + i, 3 + j)] = m6[i + j]));
+        (0..4).for_each(|i| (0..=i).for_each(|j| a[(3 + i, 3 + j)] = W2 * m6[i + j]));
         let normal: [&[f64]; 7] = [
             &[m2[0]],
             &[m2[1], m2[0] + m2[2]],
@@ -170,9 +176,9 @@ mod tests {
             let (mut ata, mut atr) = (SMatrix::<f64, 7, 7>::zeros(), SVector::<f64, 7>::zeros());
             for [x, y, z, p, q] in near {
                 equations.add(x, y, z, [p, q]);
-                for (row, r) in rows(x, y).iter().zip([z, p, q]) {
-                    ata += row * row.transpose();
-                    atr += row * r;
+                for ((row, r), w) in rows(x, y).iter().zip([z, p, q]).zip([POSITION_WEIGHT, 1.0, 1.0]) {
+                    ata += row * row.transpose() * w.powi(2);
+                    atr += row * r * w.powi(2);
                 }
             }
             prop_assert!((equations.matrix() - ata.lower_triangle()).norm() < 1e-12);
