@@ -5,9 +5,11 @@ use numpy::{
     Element, IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray1, PyReadonlyArray2, PyUntypedArrayMethods,
 };
 use pyo3::prelude::*;
+use pyo3::types::PyDict;
 use siloscope::axis::{self, Wall};
 use siloscope::backproject::{DepthImage, Depths};
 use siloscope::candidates::{self, Candidate, View};
+use siloscope::locate::{self, Outcome};
 use siloscope::neighbours::Neighbours;
 use siloscope::shape_tensor::ShapeTensor;
 use siloscope::workers::Workers;
@@ -227,6 +229,70 @@ fn axis_points<'py>(
     flat.into_pyarray(py).reshape([estimates.len(), 2])
 }
 
+/// The six steps' settings: grid, neighbours, view, share, agreement, partners, threads.
+type Settings<'a> = (f64, usize, &'a str, f64, f64, usize, usize);
+
+fn settings((grid, neighbours, view, share, agreement, partners, threads): Settings) -> PyResult<locate::Settings> {
+    let view = if view == "auto" { None } else { Some(self::view(view)?) };
+    Ok(locate::Settings { grid, neighbours, view, share, agreement, partners, threads })
+}
+
+/// Runs the six steps on a depth image: a dictionary of plain numbers, or only the reason for a refusal, as `refusal`.
+#[pyfunction]
+fn shape_tensor_image<'py>(
+    py: Python<'py>,
+    depth: DepthArray<'py>,
+    camera: &Bound<'py, PyAny>,
+    rays: Option<Doubles<'py>>,
+    unit: f64,
+    mask: Option<PyReadonlyArray2<'py, bool>>,
+    settings: Settings,
+) -> PyResult<Bound<'py, PyDict>> {
+    let (camera, settings) = (self::camera(camera)?, self::settings(settings)?);
+    let rays = rays.as_ref().map(rays_of).transpose()?;
+    let mask = mask.as_ref().map(entries).transpose()?;
+    let image = DepthImage::new(depth.depths()?, &camera, rays, unit, mask).map_err(value_error)?;
+    outcome(py, py.detach(|| locate::locate_in_image(&image, &settings)).map_err(value_error)?)
+}
+
+/// Runs the six steps on points (N, 3), metres, seen from the origin; rows that aren't finite are left out.
+#[pyfunction]
+fn shape_tensor_points<'py>(py: Python<'py>, points: Doubles, settings: Settings) -> PyResult<Bound<'py, PyDict>> {
+    let (points, settings) = (vectors(&points)?, self::settings(settings)?);
+    outcome(py, py.detach(|| locate::locate_in_points(&points, &settings)).map_err(value_error)?)
+}
+
+fn outcome(py: Python<'_>, found: Outcome) -> PyResult<Bound<'_, PyDict>> {
+    let out = PyDict::new(py);
+    let found = match found {
+        Ok(found) => found,
+        Err(refusal) => {
+            out.set_item("refusal", refusal.slug())?;
+            return Ok(out);
+        }
+    };
+    let (pose, profile, e) = (found.pose, found.profile, found.evidence);
+    out.set_item("pose", (pose.r_x, pose.r_y, pose.t_x, pose.t_y))?;
+    out.set_item("covariance", PyArray1::from_slice(py, found.covariance.as_slice()).reshape([4, 4])?)?;
+    out.set_item("radius", profile.radius.map(|radius| (radius, profile.radius_std)))?;
+    out.set_item("apex", profile.cone.map(|cone| (cone.apex, profile.apex_std())))?;
+    out.set_item("bottom", profile.bottom().map(|bottom| (bottom, profile.bottom_std())))?;
+    out.set_item("misfit", profile.misfit)?;
+    out.set_item("pixels", found.shares.pixels)?;
+    out.set_item("areas", found.shares.areas)?;
+    let evidence = PyDict::new(py);
+    for (key, count) in [("points", e.points), ("candidates", e.candidates), ("walls", e.walls)] {
+        evidence.set_item(key, count)?;
+    }
+    let measures = [("around", e.around), ("along", e.along), ("miss", e.miss), ("turn", e.turn), ("bend", e.bend)];
+    for (key, value) in measures.into_iter().chain([("behind", e.behind)]) {
+        evidence.set_item(key, value)?;
+    }
+    out.set_item("evidence", evidence)?;
+    out.set_item("timing", found.timing)?;
+    Ok(out)
+}
+
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(back_project, m)?)?;
     m.add_function(wrap_pyfunction!(voxel_grid, m)?)?;
@@ -236,5 +302,7 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(select_candidates, m)?)?;
     m.add_function(wrap_pyfunction!(axis_direction, m)?)?;
     m.add_function(wrap_pyfunction!(consistent_direction, m)?)?;
-    m.add_function(wrap_pyfunction!(axis_points, m)?)
+    m.add_function(wrap_pyfunction!(axis_points, m)?)?;
+    m.add_function(wrap_pyfunction!(shape_tensor_image, m)?)?;
+    m.add_function(wrap_pyfunction!(shape_tensor_points, m)?)
 }

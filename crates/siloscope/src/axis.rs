@@ -61,7 +61,7 @@ fn direction_of(candidates: &[Candidate]) -> Direction {
     axis_direction(candidates.iter().map(|c| c.e1))
 }
 
-/// A wall point with its normal.
+/// A wall point with its normal, in the camera frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Wall {
     /// The point p.

@@ -16,6 +16,21 @@ pub enum View {
 }
 
 impl View {
+    /// The side from which most points see a surface that is bent one way and nearly straight the other.
+    ///
+    /// Where many are seen from either side there is no telling.
+    pub fn of(points: &[Vec3], tensors: &[ShapeTensor]) -> Self {
+        let least = 1.0 / extent(points);
+        let is_wall = |c: &Candidate| c.bent.abs() > least && c.straight.abs() < STRAIGHT * c.bent.abs();
+        let bent = tensors.iter().enumerate().map(|(i, t)| Candidate::new(i, t)).filter(is_wall).map(|c| c.bent);
+        let (inside, outside) = bent.fold((0, 0), |(i, o), k| if k > 0.0 { (i + 1, o) } else { (i, o + 1) });
+        match (inside, outside) {
+            (i, o) if i > 3 * o => Self::Inside,
+            (i, o) if o > 3 * i => Self::Outside,
+            _ => Self::Either,
+        }
+    }
+
     fn allows(self, curvature: f64) -> bool {
         match self {
             Self::Inside => curvature > 0.0,
@@ -24,6 +39,9 @@ impl View {
         }
     }
 }
+
+/// Curvature along over curvature across below which a surface is nearly straight one way.
+const STRAIGHT: f64 = 0.2;
 
 /// A point that may lie on a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]

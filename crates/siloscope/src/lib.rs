@@ -5,7 +5,9 @@
 //! axis at the camera's height and z along gravity.
 
 pub mod axis;
+pub mod axis_covariance;
 pub mod backproject;
+pub mod blocks;
 pub mod camera;
 pub mod candidates;
 pub mod cloud;
@@ -13,6 +15,7 @@ pub mod coarse;
 pub mod covariance;
 pub mod eigen;
 pub mod error;
+pub mod evidence;
 pub mod fit;
 pub mod grid;
 pub mod labels;
@@ -24,11 +27,13 @@ pub mod patches;
 pub mod pixels;
 pub mod polish;
 pub mod pose;
+pub mod profile;
 pub mod refine;
 pub mod refusal;
 pub mod sensor;
 pub mod shape_tensor;
 pub mod share;
+pub mod shares;
 pub mod start;
 pub mod surface;
 pub mod verdict;

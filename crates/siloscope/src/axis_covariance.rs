@@ -1,0 +1,90 @@
+//! How sure the six steps' axis is: from how much blocks of neighbouring points disagree.
+//!
+//! Neighbouring points share their neighbours, so their errors go together. Sums over blocks larger than those
+//! neighbourhoods count as independent (a cluster-robust sandwich). What moves all points alike, such as a depth bias,
+//! can't be seen this way and is not in the covariance.
+
+use crate::axis::AxisPoint;
+use crate::blocks::sums;
+use crate::{SiloPose, Vec3};
+use nalgebra::{Matrix2, Matrix4, Matrix4x2, Vector2};
+
+/// What the covariance is drawn from.
+pub struct Scatter<'a> {
+    /// The pose found.
+    pub pose: &'a SiloPose,
+    /// E1 of the walls, in the silo frame.
+    pub e1: &'a [Vec3],
+    /// Estimated axis points.
+    pub estimates: &'a [AxisPoint],
+    /// Block of each wall, and the number of blocks.
+    pub block: &'a [usize],
+    /// Number of blocks.
+    pub blocks: usize,
+    /// Mean z of the walls in the silo frame: there, direction and position of the axis are independent.
+    pub height: f64,
+    /// Robust standard deviations beyond which candidates were left out.
+    pub agreement: f64,
+}
+
+impl Scatter<'_> {
+    /// Covariance of r_x, r_y, t_x and t_y.
+    pub fn covariance(&self) -> Matrix4<f64> {
+        // A tilt δ of X in the silo frame: r_y falls by δ_x, r_x grows by δ_y / cos r_y, and the axis, held at the
+        // walls' height h, moves by hδ where it passes the camera.
+        let (h, cos) = (self.height, self.pose.r_y.cos());
+        let tilt = Matrix4x2::new(0.0, 1.0 / cos, -1.0, 0.0, h, 0.0, 0.0, h);
+        let shift = Matrix4x2::new(0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0);
+        tilt * self.of_tilt() * tilt.transpose() + shift * self.of_point() * shift.transpose()
+    }
+
+    /// The tilt solves Σ e (e·δ + E1·X) = 0 with e the part of E1 across the axis.
+    fn of_tilt(&self) -> Matrix2<f64> {
+        let bread: Matrix2<f64> = self.e1.iter().map(|e| e.xy() * e.xy().transpose()).sum();
+        let scores = self.block.iter().zip(self.e1).map(|(block, e)| (*block, (e.xy() * e.z).into()));
+        self.sandwich(&bread, sums(scores, self.blocks)) * trimming(self.agreement).powi(2)
+    }
+
+    /// Each coordinate solves Σ sign(x_i − median) = 0, whose slope is the density of the estimates at the median.
+    fn of_point(&self) -> Matrix2<f64> {
+        let columns = [0, 1].map(|k| self.estimates.iter().map(|e| e.at[k]).collect::<Vec<_>>());
+        let centre = columns.clone().map(|column| quantiles(column, [0.35, 0.5, 0.65]));
+        let n = self.estimates.len() as f64;
+        let density = centre.map(|[low, _, high]| n * 0.3 / (high - low).max(f64::MIN_POSITIVE));
+        let signs = |e: &AxisPoint| [0, 1].map(|k| 0.5 * (e.at[k] - centre[k][1]).signum());
+        let block = |wall: u32| self.block[wall as usize];
+        let planes = self.estimates.iter().map(|e| (block(e.plane), signs(e)));
+        let lines = self.estimates.iter().map(|e| (block(e.line), signs(e)));
+        let both = [sums(planes, self.blocks), sums(lines, self.blocks)];
+        let bread = Matrix2::from_diagonal(&Vector2::from(density));
+        both.into_iter().map(|scores| self.sandwich(&bread, scores)).sum()
+    }
+
+    fn sandwich(&self, bread: &Matrix2<f64>, scores: Vec<[f64; 2]>) -> Matrix2<f64> {
+        let meat: Matrix2<f64> = scores.into_iter().map(Vector2::from).map(|s| s * s.transpose()).sum();
+        let few = self.blocks as f64 / (self.blocks as f64 - 2.0).max(0.0);
+        let inverse = bread.try_inverse().unwrap_or_else(|| Matrix2::repeat(f64::INFINITY));
+        inverse * meat * inverse * few
+    }
+}
+
+/// What leaving out beyond c standard deviations costs: candidates that enter and leave as X turns weaken its hold by
+/// P(|x| < c) / (P(|x| < c) − 2c φ(c)) for normally distributed x.
+fn trimming(c: f64) -> f64 {
+    if c.is_infinite() {
+        return 1.0;
+    }
+    let density = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
+    let steps = 200;
+    let inside: f64 = (0..steps).map(|i| density((f64::from(i) + 0.5) / f64::from(steps) * c)).sum::<f64>() * 2.0 * c
+        / f64::from(steps);
+    inside / (inside - 2.0 * c * density(c))
+}
+
+fn quantiles<const N: usize>(mut values: Vec<f64>, at: [f64; N]) -> [f64; N] {
+    let last = values.len().saturating_sub(1) as f64;
+    at.map(|q| match values.is_empty() {
+        true => f64::NAN,
+        false => *values.select_nth_unstable_by((q * last).round() as usize, f64::total_cmp).1,
+    })
+}
