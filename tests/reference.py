@@ -76,8 +76,9 @@ def shape_tensors(points: Array, neighbours: NDArray[np.intp], normal: Array) ->
     """Adjacent-normal cubic approximation (Goldfeather and Interrante 2004).
 
     In local coordinates with the normal as z, the surface is z = a/2 x² + b xy + c/2 y² + d x³ + e x²y + f xy² + g y³.
-    Every neighbour gives one equation for its position and two for its normal; lengths are in units of the
-    distance to the farthest neighbour, so that position and normal equations weigh alike at every scale.
+    Every neighbour gives one equation for its position, of weight 0.5, and two for its normal, of weight 1; lengths are
+    in units of the distance to the farthest neighbour. Neighbours whose normal is nearly perpendicular to the point's
+    own are left out.
     """
     n = len(points)
     k1, k2, E1, E2 = np.zeros(n), np.zeros(n), np.zeros((n, 3)), np.zeros((n, 3))
@@ -85,22 +86,48 @@ def shape_tensors(points: Array, neighbours: NDArray[np.intp], normal: Array) ->
         t1, t2 = tangent_basis(normal[i])
         d = points[neighbours[i]] - p
         unit = np.linalg.norm(d, axis=1).max()
-        x, y, z = d @ t1 / unit, d @ t2 / unit, d @ normal[i] / unit
         m = normal[neighbours[i]]
+        seen = np.abs(m @ normal[i]) > 0.1
+        d, m = d[seen] / unit, m[seen]
+        x, y, z = d @ t1, d @ t2, d @ normal[i]
         mx, my, mz = m @ t1, m @ t2, m @ normal[i]
-        seen = np.abs(mz) > 0.1
-        o, one = np.zeros_like(x), np.ones_like(x)
+        o = np.zeros_like(x)
         position = np.column_stack([x * x / 2, x * y, y * y / 2, x**3, x * x * y, x * y * y, y**3])
-        along_x = np.column_stack([x, y, o, 3 * x * x, 2 * x * y, y * y, o])[seen]
-        along_y = np.column_stack([o, x, y, o, x * x, 2 * x * y, 3 * y * y])[seen]
-        A = np.concatenate([position, along_x, along_y])
-        rhs = np.concatenate([z, -(mx / (mz + ~seen * one))[seen], -(my / (mz + ~seen * one))[seen]])
+        along_x = np.column_stack([x, y, o, 3 * x * x, 2 * x * y, y * y, o])
+        along_y = np.column_stack([o, x, y, o, x * x, 2 * x * y, 3 * y * y])
+        A = np.concatenate([0.5 * position, along_x, along_y])
+        rhs = np.concatenate([0.5 * z, -mx / mz, -my / mz])
         a, b, c = np.linalg.lstsq(A, rhs, rcond=None)[0][:3] / unit
         (low, high), vectors = np.linalg.eigh(np.array([[a, b], [b, c]]))
         k1[i], k2[i] = high, low
         E1[i] = vectors[0, 1] * t1 + vectors[1, 1] * t2
         E2[i] = vectors[0, 0] * t1 + vectors[1, 0] * t2
     return ShapeTensors(k1, k2, E1, E2)
+
+
+def select_candidates(
+    points: Array, neighbours: NDArray[np.intp], tensors: ShapeTensors, share: float = 0.5, view: str = "inside"
+) -> tuple[NDArray[np.intp], Array]:
+    """The `share` with the smallest |k2| of the points that are clearly curved and surrounded: index and E1.
+
+    Clear is a radius of curvature below the extent of the cloud. Surrounded is a point where the mean of its neighbours
+    lies within 0.15 of the distance to the farthest. From outside, the principal curvatures change places.
+    """
+    extent = np.linalg.norm(points.max(axis=0) - points.min(axis=0)) if len(points) else 0.0
+    swap = np.abs(tensors.k2) > np.abs(tensors.k1)
+    bent, straight = np.where(swap, tensors.k2, tensors.k1), np.where(swap, tensors.k1, tensors.k2)
+    E1 = np.where(swap[:, None], tensors.E2, tensors.E1)
+    clear = []
+    for i, p in enumerate(points):
+        d = points[neighbours[i]] - p
+        surrounded = np.linalg.norm(d.mean(axis=0)) <= 0.15 * np.linalg.norm(d, axis=1).max()
+        side = {"inside": bent[i] > 0, "outside": bent[i] < 0, "either": True}[view]
+        if abs(bent[i]) > 1 / extent and side and surrounded:
+            clear.append(i)
+    index = np.array(clear, dtype=np.intp)
+    index = index[np.argsort(np.abs(straight[index]), kind="stable")]
+    index = index[: int(np.ceil(share * len(index)))]
+    return index, E1[index]
 
 
 def axis_direction(E1: Array) -> Array:
@@ -111,3 +138,71 @@ def axis_direction(E1: Array) -> Array:
         scatter += products.T @ products
     X = np.linalg.eigh(scatter)[1][:, 2]
     return -X if X[2] < 0 else X
+
+
+def consistent_direction(E1: Array, agreement: float = 2.0) -> tuple[Array, NDArray[np.intp]]:
+    """Direction of the candidates that agree with each other, and their numbers.
+
+    Five times from the first fifth without those farther off the perpendicular than `agreement` robust standard
+    deviations of the rest, then five times from all within the last such limit.
+    """
+    everybody = np.arange(len(E1))
+    if np.isinf(agreement):
+        return axis_direction(E1), everybody
+    kept = fifth = everybody[: int(np.ceil(0.2 * len(E1)))]
+    limit = np.inf
+    for _ in range(5):
+        off = np.abs(E1 @ axis_direction(E1[kept]))
+        limit = agreement * 1.4826 * np.median(off[kept]) + np.finfo(float).eps
+        kept = fifth[off[fifth] <= limit]
+    kept = everybody[off <= limit]
+    for _ in range(5):
+        off = np.abs(E1 @ axis_direction(E1[kept]))
+        kept = everybody[off <= limit]
+    return axis_direction(E1[kept]), kept
+
+
+def rotation(X: Array) -> Array:
+    """R = Ry(r_y)·Rx(r_x) of Eq. 5 with the angles of Eq. 6."""
+    r_x, r_y = np.arcsin(X[1] / np.sqrt(1 - X[0] ** 2)), np.arcsin(-X[0])
+    sx, cx, sy, cy = np.sin(r_x), np.cos(r_x), np.sin(r_y), np.cos(r_y)
+    return np.array([[cy, sx * sy, cx * sy], [0, cx, -sx], [-sy, sx * cy, cx * cy]])
+
+
+def axis_points(points: Array, normal: Array, X: Array, partners: int = 50) -> Array:
+    """Points where the lines p' + λN' meet the planes π(p, X, N), projected into the plane through the origin (Eq. 4).
+
+    Partners p' are the quarter with the greatest |(N × X)·N'| of 4 `partners` evenly spread candidates.
+    """
+    pool = np.array([i * len(points) // min(4 * partners, len(points)) for i in range(min(4 * partners, len(points)))])
+    estimates = []
+    for p, N in zip(points, normal, strict=True):
+        across = np.cross(N, X)
+        best = pool[np.argsort(-np.abs(normal[pool] @ across), kind="stable")]
+        for j in best[: int(np.ceil(len(pool) / 4))]:
+            lam = (p - points[j]) @ across / (normal[j] @ across)
+            met = points[j] + lam * normal[j]
+            estimates.append(met - (met @ X) * X)
+    return np.array(estimates)
+
+
+def axis_point(estimates: Array, X: Array) -> Array:
+    """Median along the x and y of the turned frame."""
+    R = rotation(X)
+    x, y, _ = np.median(estimates @ R.T, axis=0)
+    return R.T @ np.array([x, y, 0.0])
+
+
+def locate(points: Array, grid: float = 0.05, k: int = 30) -> Array:
+    """All steps: T_silo_camera (4, 4) (Eqs. 5 to 7)."""
+    cloud = voxel_grid(points, grid)
+    near = nearest_neighbours(cloud, k)
+    N = normals(cloud, near)
+    index, E1 = select_candidates(cloud, near, shape_tensors(cloud, near, N))
+    X, kept = consistent_direction(E1)
+    walls = index[kept]
+    R = rotation(X)
+    a = R @ axis_point(axis_points(cloud[walls], N[walls], X), X)
+    T = np.eye(4)
+    T[:3, :3], T[:2, 3] = R, -a[:2]
+    return T

@@ -56,3 +56,46 @@ def surface_fit_cloud(
 ) -> dict[str, Any]: ...
 def surface_refusals() -> list[tuple[str, str, str]]: ...
 def depth_metres(depth: NDArray[Any], unit: float) -> tuple[NDArray[np.float32], int]: ...
+
+# The six steps
+def back_project(
+    depth: NDArray[Any], camera: Any, rays: NDArray[np.float64] | None, unit: float, mask: NDArray[np.bool_] | None
+) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
+def voxel_grid(
+    points: NDArray[np.float64], size: float, threads: int
+) -> tuple[NDArray[np.float64], NDArray[np.uint32]]: ...
+def nearest_neighbours(points: NDArray[np.float64], k: int, threads: int) -> NDArray[np.uint32]: ...
+def hoppe_normals(points: NDArray[np.float64], neighbours: NDArray[np.uint32], threads: int) -> NDArray[np.float64]: ...
+def shape_tensors(
+    points: NDArray[np.float64], neighbours: NDArray[np.uint32], normals: NDArray[np.float64], threads: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]: ...
+def select_candidates(
+    points: NDArray[np.float64],
+    neighbours: NDArray[np.uint32],
+    k1: NDArray[np.float64],
+    k2: NDArray[np.float64],
+    e1: NDArray[np.float64],
+    e2: NDArray[np.float64],
+    share: float,
+    view: str,
+) -> tuple[NDArray[np.uint32], NDArray[np.float64]]: ...
+def axis_direction(e1: NDArray[np.float64]) -> tuple[list[float], list[float]]: ...
+def consistent_direction(e1: NDArray[np.float64], agreement: float) -> tuple[list[float], NDArray[np.uint32]]: ...
+def axis_points(
+    points: NDArray[np.float64],
+    normals: NDArray[np.float64],
+    direction: tuple[float, float, float],
+    partners: int,
+    threads: int,
+) -> NDArray[np.float64]: ...
+def shape_tensor_image(
+    depth: NDArray[Any],
+    camera: Any,
+    rays: NDArray[np.float64] | None,
+    unit: float,
+    mask: NDArray[np.bool_] | None,
+    settings: tuple[float, int, str, float, float, int, int],
+) -> dict[str, Any]: ...
+def shape_tensor_points(
+    points: NDArray[np.float64], settings: tuple[float, int, str, float, float, int, int]
+) -> dict[str, Any]: ...

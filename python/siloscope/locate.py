@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from siloscope import sensors, surface
+from siloscope import sensors, shape_tensor, surface
 from siloscope.camera import Camera
 from siloscope.errors import UsageError
 from siloscope.estimate import Estimate
@@ -118,7 +118,19 @@ def _surface(prepared: Prepared, settings: Settings, config: dict[str, Any]) -> 
     return surface.fit_depth(prepared.depth, prepared.camera, settings.profile, **known)
 
 
-METHODS: dict[str, Callable[[Prepared, Settings, dict[str, Any]], Estimate]] = {"surface": _surface}
+def _shape_tensor(prepared: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:
+    chosen = shape_tensor.Settings(grid=settings.grid, neighbours=settings.neighbours, threads=settings.threads)
+    if prepared.points is not None:
+        return shape_tensor.fit_points(prepared.points, chosen, config)
+    assert prepared.depth is not None
+    assert prepared.camera is not None
+    return shape_tensor.fit_depth(prepared.depth, prepared.camera, chosen, config)
+
+
+METHODS: dict[str, Callable[[Prepared, Settings, dict[str, Any]], Estimate]] = {
+    "surface": _surface,
+    "shape-tensor": _shape_tensor,
+}
 """The methods by name."""
 
 

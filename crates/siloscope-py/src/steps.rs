@@ -71,12 +71,14 @@ fn near(neighbours: &PyReadonlyArray2<u32>, n: usize) -> PyResult<Neighbours> {
     Neighbours::from_indices(*k, entries(neighbours)?.to_vec(), n).map_err(value_error)
 }
 
-fn view(name: &str) -> PyResult<View> {
+/// A view by name; None for "auto".
+fn view(name: &str) -> PyResult<Option<View>> {
     match name {
-        "inside" => Ok(View::Inside),
-        "outside" => Ok(View::Outside),
-        "either" => Ok(View::Either),
-        other => Err(value_error(format!("view must be inside, outside or either, got '{other}'"))),
+        "auto" => Ok(None),
+        "inside" => Ok(Some(View::Inside)),
+        "outside" => Ok(Some(View::Outside)),
+        "either" => Ok(Some(View::Either)),
+        other => Err(value_error(format!("unknown view '{other}'"))),
     }
 }
 
@@ -171,6 +173,7 @@ fn shape_tensors<'py>(
 fn select_candidates<'py>(
     py: Python<'py>,
     points: Doubles<'py>,
+    neighbours: PyReadonlyArray2<'py, u32>,
     k1: PyReadonlyArray1<'py, f64>,
     k2: PyReadonlyArray1<'py, f64>,
     e1: Doubles<'py>,
@@ -179,7 +182,7 @@ fn select_candidates<'py>(
     view: &str,
 ) -> PyResult<(Indices<'py>, Vectors<'py>)> {
     let (points, e1, e2) = (vectors(&points)?, vectors(&e1)?, vectors(&e2)?);
-    let (k1, k2, view) = (k1.as_array(), k2.as_array(), self::view(view)?);
+    let (k1, k2, view) = (k1.as_array(), k2.as_array(), self::view(view)?.unwrap_or_default());
     for (what, got) in [("k1", k1.len()), ("k2", k2.len()), ("E1", e1.len()), ("E2", e2.len())] {
         same_length(what, got, points.len())?;
     }
@@ -190,7 +193,8 @@ fn select_candidates<'py>(
         .zip(directions)
         .map(|((k1, k2), (e1, e2))| ShapeTensor { k1: *k1, k2: *k2, e1, e2 })
         .collect();
-    let found = candidates::select_candidates(&points, &tensors, share, view);
+    let near = near(&neighbours, points.len())?;
+    let found = candidates::select_candidates(&points, &near, &tensors, share, view);
     let index: Vec<u32> = found.iter().map(|c| c.index as u32).collect();
     Ok((index.into_pyarray(py), to_array(py, &found.iter().map(|c| c.e1).collect::<Vec<_>>())?))
 }
@@ -233,8 +237,7 @@ fn axis_points<'py>(
 type Settings<'a> = (f64, usize, &'a str, f64, f64, usize, usize);
 
 fn settings((grid, neighbours, view, share, agreement, partners, threads): Settings) -> PyResult<locate::Settings> {
-    let view = if view == "auto" { None } else { Some(self::view(view)?) };
-    Ok(locate::Settings { grid, neighbours, view, share, agreement, partners, threads })
+    Ok(locate::Settings { grid, neighbours, view: self::view(view)?, share, agreement, partners, threads })
 }
 
 /// Runs the six steps on a depth image: a dictionary of plain numbers, or only the reason for a refusal, as `refusal`.
@@ -278,8 +281,8 @@ fn outcome(py: Python<'_>, found: Outcome) -> PyResult<Bound<'_, PyDict>> {
     out.set_item("apex", profile.cone.map(|cone| (cone.apex, profile.apex_std())))?;
     out.set_item("bottom", profile.bottom().map(|bottom| (bottom, profile.bottom_std())))?;
     out.set_item("misfit", profile.misfit)?;
-    out.set_item("pixels", found.shares.pixels)?;
-    out.set_item("areas", found.shares.areas)?;
+    out.set_item("pixels", found.coverage.pixels)?;
+    out.set_item("areas", found.coverage.areas)?;
     let evidence = PyDict::new(py);
     for (key, count) in [("points", e.points), ("candidates", e.candidates), ("walls", e.walls)] {
         evidence.set_item(key, count)?;

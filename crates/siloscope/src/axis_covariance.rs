@@ -6,8 +6,17 @@
 
 use crate::axis::AxisPoint;
 use crate::blocks::sums;
+use crate::refusal::Refusal;
 use crate::{SiloPose, Vec3};
 use nalgebra::{Matrix2, Matrix4, Matrix4x2, Vector2};
+
+/// Blocks that touch are not quite independent: measured against the true errors of simulated frames
+/// (docs/design/choices-shape-tensor.md).
+const TOUCHING: f64 = 1.5;
+/// Fewest blocks that tell a scatter.
+const LEAST_BLOCKS: usize = 6;
+/// Largest standard deviation of the direction that still is an answer, radians.
+const MOST_TILT: f64 = 0.05;
 
 /// What the covariance is drawn from.
 pub struct Scatter<'a> {
@@ -28,8 +37,15 @@ pub struct Scatter<'a> {
 }
 
 impl Scatter<'_> {
-    /// Covariance of r_x, r_y, t_x and t_y.
-    pub fn covariance(&self) -> Matrix4<f64> {
+    /// Covariance of r_x, r_y, t_x and t_y; none where the direction is hardly determined.
+    pub fn covariance(&self) -> Result<Matrix4<f64>, Refusal> {
+        let covariance = self.sandwiches() * TOUCHING;
+        let std = covariance.diagonal().map(f64::sqrt);
+        let determined = self.blocks >= LEAST_BLOCKS && std.x < MOST_TILT && std.y < MOST_TILT;
+        if determined { Ok(covariance) } else { Err(Refusal::PoorlyDetermined) }
+    }
+
+    fn sandwiches(&self) -> Matrix4<f64> {
         // A tilt δ of X in the silo frame: r_y falls by δ_x, r_x grows by δ_y / cos r_y, and the axis, held at the
         // walls' height h, moves by hδ where it passes the camera.
         let (h, cos) = (self.height, self.pose.r_y.cos());

@@ -1,6 +1,7 @@
 //! Step 3: points that potentially lie on the cylinder or the cone.
 
 use crate::Vec3;
+use crate::neighbours::Neighbours;
 use crate::shape_tensor::ShapeTensor;
 
 /// From which side the walls are seen; it tells the sign of their curvature, as normals point to the camera.
@@ -16,21 +17,6 @@ pub enum View {
 }
 
 impl View {
-    /// The side from which most points see a surface that is bent one way and nearly straight the other.
-    ///
-    /// Where many are seen from either side there is no telling.
-    pub fn of(points: &[Vec3], tensors: &[ShapeTensor]) -> Self {
-        let least = 1.0 / extent(points);
-        let is_wall = |c: &Candidate| c.bent.abs() > least && c.straight.abs() < STRAIGHT * c.bent.abs();
-        let bent = tensors.iter().enumerate().map(|(i, t)| Candidate::new(i, t)).filter(is_wall).map(|c| c.bent);
-        let (inside, outside) = bent.fold((0, 0), |(i, o), k| if k > 0.0 { (i + 1, o) } else { (i, o + 1) });
-        match (inside, outside) {
-            (i, o) if i > 3 * o => Self::Inside,
-            (i, o) if o > 3 * i => Self::Outside,
-            _ => Self::Either,
-        }
-    }
-
     fn allows(self, curvature: f64) -> bool {
         match self {
             Self::Inside => curvature > 0.0,
@@ -39,9 +25,6 @@ impl View {
         }
     }
 }
-
-/// Curvature along over curvature across below which a surface is nearly straight one way.
-const STRAIGHT: f64 = 0.2;
 
 /// A point that may lie on a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,14 +53,32 @@ impl Candidate {
 ///
 /// Clear is a radius of curvature below the extent of the cloud: a silo's radius is, and the direction in which flatter
 /// ground bends is noise. A share of these and not of all points keeps a frame that is mostly feed from filling up
-/// with it.
-pub fn select_candidates(points: &[Vec3], tensors: &[ShapeTensor], share: f64, view: View) -> Vec<Candidate> {
+/// with it. Points at the edge of what is seen are left out: with neighbours on one side only they have no tensor,
+/// like the points of R0 (section 2.2.3).
+pub fn select_candidates(
+    points: &[Vec3],
+    neighbours: &Neighbours,
+    tensors: &[ShapeTensor],
+    share: f64,
+    view: View,
+) -> Vec<Candidate> {
     let least = 1.0 / extent(points);
-    let clear = |c: &Candidate| c.bent.abs() > least && view.allows(c.bent);
+    let clear = |c: &Candidate| {
+        c.bent.abs() > least && view.allows(c.bent) && is_surrounded(points, c.index, neighbours.of(c.index))
+    };
     let mut candidates: Vec<_> = tensors.iter().enumerate().map(|(i, t)| Candidate::new(i, t)).filter(clear).collect();
     candidates.sort_by(|a, b| a.straight.abs().total_cmp(&b.straight.abs()));
     candidates.truncate((share * candidates.len() as f64).ceil() as usize);
     candidates
+}
+
+/// How far the middle of a point's neighbours may lie from it, in units of the distance to the farthest of them.
+const OFF_CENTRE: f64 = 0.15;
+
+fn is_surrounded(points: &[Vec3], i: usize, neighbours: &[u32]) -> bool {
+    let offsets = || neighbours.iter().map(|j| points[*j as usize] - points[i]);
+    let farthest = offsets().map(|d| d.norm_squared()).fold(0.0, f64::max).sqrt();
+    offsets().sum::<Vec3>().norm() <= OFF_CENTRE * farthest * neighbours.len() as f64
 }
 
 /// Diagonal of the cloud's bounding box.

@@ -9,7 +9,7 @@ use crate::surface::{Part, PlacedSurface};
 use crate::verdict::{WallEvidence, wall_evidence};
 
 /// A cone that rises less than 36° could as well be feed lying at its angle of repose, unless feed lies in it.
-const FEED_SLOPE: f64 = 1.376;
+pub(crate) const FEED_SLOPE: f64 = 1.376;
 
 /// Refines every start value on a few patches; the likeliest that stands up to the evidence is refined on more.
 ///

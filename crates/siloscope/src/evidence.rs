@@ -1,7 +1,7 @@
 //! Why to believe the six steps' axis: what must hold on walls of revolution, measured on the walls found.
 
 use crate::axis::median;
-use crate::candidates::Candidate;
+use crate::candidates::{Candidate, View};
 use crate::refusal::Refusal;
 use crate::{SiloPose, Vec3};
 
@@ -66,17 +66,34 @@ pub fn placed_walls(kept: &[Candidate], points: &[Vec3], normals: &[Vec3], pose:
     kept.iter().map(place).collect()
 }
 
+/// Fewest walls that are evidence of anything.
+const LEAST_WALLS: usize = 30;
+/// Least share of the walls among the candidates, and among all points.
+const LEAST_KEPT: f64 = 0.35;
+const LEAST_SHARE: f64 = 0.08;
+/// Least spread of E1 about the axis: walls over an arc of some 30°.
+const LEAST_AROUND: f64 = 0.06;
+/// Range of `miss`.
+const MISS: std::ops::Range<f64> = 0.0..0.06;
+/// Range of |`turn`|.
+const TURN: std::ops::Range<f64> = 0.8..1.25;
+/// Largest `along` and |`bend`|.
+const MOST_ALONG: f64 = 0.12;
+const MOST_BEND: f64 = 0.06;
+/// Largest share of pixels behind the wall.
+const MOST_BEHIND: f64 = 0.05;
+
 impl Evidence {
-    /// Measures it.
-    pub fn of(walls: &[PlacedWall], spread: [f64; 3], candidates: usize, points: usize, behind: f64) -> Self {
+    /// Measures it; `counts` are those of points and candidates, `spread` is that of step 4.
+    pub fn of(walls: &[PlacedWall], counts: [usize; 2], spread: [f64; 3], behind: f64) -> Self {
         let median_of = |f: &dyn Fn(&PlacedWall) -> f64| median(walls.iter().map(f).collect()).unwrap_or(f64::NAN);
         let miss = |w: &PlacedWall| {
             let (p, n) = (w.p.xy(), w.normal.xy());
             (p.x * n.y - p.y * n.x).abs() / (p.norm() * n.norm()).max(1e-12)
         };
         Self {
-            points,
-            candidates,
+            points: counts[0],
+            candidates: counts[1],
             walls: walls.len(),
             around: spread[1] / spread[2],
             along: spread[0] / spread[1],
@@ -88,10 +105,19 @@ impl Evidence {
     }
 
     /// Whether it is a wall of revolution.
-    pub fn judge(&self) -> Result<(), Refusal> {
-        if self.walls < 3 {
-            return Err(Refusal::NoWall);
+    ///
+    /// The limits lie between what simulated silos and what walls, corners, shafts, spheres and heaps of feed give:
+    /// docs/design/choices-shape-tensor.md.
+    pub fn judge(&self, view: View) -> Result<(), Refusal> {
+        let (walls, kept) = (self.walls as f64, LEAST_KEPT * self.candidates as f64);
+        let few = self.walls < LEAST_WALLS || walls < kept || walls < LEAST_SHARE * self.points as f64;
+        let bent = !(self.along < MOST_ALONG && self.bend.abs() < MOST_BEND);
+        match () {
+            () if few || !MISS.contains(&self.miss) => Err(Refusal::NoWall),
+            () if bent => Err(Refusal::Bent),
+            () if !(self.around > LEAST_AROUND && TURN.contains(&self.turn.abs())) => Err(Refusal::Flat),
+            () if view == View::Inside && self.behind > MOST_BEHIND => Err(Refusal::BehindWall),
+            () => Ok(()),
         }
-        Ok(())
     }
 }

@@ -5,14 +5,14 @@ use crate::axis_covariance::Scatter;
 use crate::backproject::DepthImage;
 use crate::blocks::blocks;
 use crate::candidates::{View, select_candidates};
+use crate::coverage::{Coverage, coverage};
 use crate::evidence::{Evidence, PlacedWall, placed_walls};
 use crate::grid::{Cloud, voxel_grid, voxel_grid_of_image};
-use crate::neighbours::nearest_neighbours;
+use crate::neighbours::{Neighbours, nearest_neighbours};
 use crate::normals::normals;
 use crate::profile::{Place, Profile, fit_profile};
 use crate::refusal::Refusal;
-use crate::shape_tensor::shape_tensors;
-use crate::shares::{Shares, shares};
+use crate::shape_tensor::{ShapeTensor, shape_tensors};
 use crate::workers::Workers;
 use crate::{Result, SiloPose, Vec3};
 use nalgebra::Matrix4;
@@ -25,7 +25,7 @@ pub struct Settings {
     pub grid: f64,
     /// Neighbours k of normals and shape tensors (step 2).
     pub neighbours: usize,
-    /// From which side the walls are seen; None to tell it from the frame (step 3).
+    /// From which side the walls are seen (step 3); None to try the inside first and then the others.
     pub view: Option<View>,
     /// Share of the clearly curved points kept as candidates (step 3).
     pub share: f64,
@@ -53,7 +53,7 @@ pub struct Located {
     /// Radius and cone, as far as they are seen.
     pub profile: Profile,
     /// What is seen, by pixels and by area.
-    pub shares: Shares,
+    pub coverage: Coverage,
     /// Why to believe it.
     pub evidence: Evidence,
     /// Milliseconds of the steps.
@@ -68,7 +68,7 @@ pub fn locate_in_image(image: &DepthImage, settings: &Settings) -> Result<Outcom
     let (workers, mut clock) = (Workers::new(settings.threads), Clock::start());
     let cloud = voxel_grid_of_image(image, settings.grid, &workers)?; // step 1, Eqs. 1 and 2
     clock.lap("points");
-    locate_in_grid(&cloud, settings, &workers, clock)
+    locate_in_grid(cloud, &[View::Inside, View::Outside], settings, &workers, clock)
 }
 
 /// Finds the axis in a cloud of points in the camera frame.
@@ -76,10 +76,24 @@ pub fn locate_in_points(points: &[Vec3], settings: &Settings) -> Result<Outcome>
     let (workers, mut clock) = (Workers::new(settings.threads), Clock::start());
     let cloud = voxel_grid(points, settings.grid, &workers)?; // step 1
     clock.lap("points");
-    locate_in_grid(&cloud, settings, &workers, clock)
+    locate_in_grid(cloud, &[View::Inside, View::Outside, View::Either], settings, &workers, clock)
 }
 
-fn locate_in_grid(cloud: &Cloud, settings: &Settings, workers: &Workers, mut clock: Clock) -> Result<Outcome> {
+/// What steps 1 and 2 make of a frame.
+struct Surface {
+    cloud: Cloud,
+    near: Neighbours,
+    normals: Vec<Vec3>,
+    tensors: Vec<ShapeTensor>,
+}
+
+fn locate_in_grid(
+    cloud: Cloud,
+    views: &[View],
+    settings: &Settings,
+    workers: &Workers,
+    mut clock: Clock,
+) -> Result<Outcome> {
     let points = &cloud.points;
     if points.len() <= settings.neighbours {
         return Ok(Err(Refusal::NoDepth));
@@ -90,41 +104,59 @@ fn locate_in_grid(cloud: &Cloud, settings: &Settings, workers: &Workers, mut clo
     clock.lap("normals");
     let tensors = shape_tensors(points, &near, &normals, workers); // step 2, Goldfeather and Interrante
     clock.lap("shape tensors");
-    let view = settings.view.unwrap_or_else(|| View::of(points, &tensors));
-    let candidates = select_candidates(points, &tensors, settings.share, view); // step 3
+    let surface = Surface { near, normals, tensors, cloud };
+    let chosen = settings.view.map(|view| [view]);
+    let views = chosen.as_ref().map_or(views, |view| view);
+    let mut outcomes = views.iter().map(|view| axis_seen_from(*view, &surface, settings, workers, &mut clock));
+    // Where no view gives an axis, the first one's reason is the one to tell.
+    let first = outcomes.next().unwrap_or(Err(Refusal::NoWall));
+    let outcome = first.or_else(|refusal| outcomes.find_map(Outcome::ok).ok_or(refusal));
+    drop(outcomes);
+    Ok(outcome.map(|located| Located { timing: clock.laps, ..located }))
+}
+
+/// Steps 3 to 6.
+fn axis_seen_from(view: View, surface: &Surface, settings: &Settings, workers: &Workers, clock: &mut Clock) -> Outcome {
+    let Surface { cloud, near, normals, tensors } = surface;
+    let points = &cloud.points;
+    let candidates = select_candidates(points, near, tensors, settings.share, view); // step 3
     clock.lap("candidates");
     let (direction, kept) = consistent_direction(&candidates, settings.agreement); // step 4, Eq. 3
     clock.lap("direction");
     let walls: Vec<Wall> = kept.iter().map(|c| Wall { p: points[c.index], normal: normals[c.index] }).collect();
     let estimates = axis_points(&walls, &direction.x, settings.partners, workers); // step 5, Eq. 4
-    let Some(a) = axis_point(&estimates) else { return Ok(Err(Refusal::NoWall)) };
+    let a = axis_point(&estimates).ok_or(Refusal::NoWall)?;
     clock.lap("point");
     let pose = SiloPose { t_x: -a.x, t_y: -a.y, ..SiloPose::from_axis(&direction.x, &Vec3::zeros()) }; // step 6, Eqs. 6, 7
-    let walls = placed_walls(&kept, points, &normals, &pose);
-    let count = (points.len(), candidates.len());
-    let outcome = assess(cloud, &normals, &walls, &Found { pose, direction, estimates, count }, settings);
+    let walls = placed_walls(&kept, points, normals, &pose);
+    let found = Found { pose, view, direction, estimates, candidates: candidates.len() };
+    let outcome = assess(surface, &walls, &found, settings);
     clock.lap("evidence");
-    Ok(outcome.map(|located| Located { timing: clock.laps, ..located }))
+    outcome
 }
 
 /// What the six steps found.
 struct Found {
     pose: SiloPose,
+    view: View,
     direction: Direction,
     estimates: Vec<AxisPoint>,
-    count: (usize, usize),
+    candidates: usize,
 }
 
 /// What the paper leaves out: how sure the answer is, whether to give it, and what the frame shows.
-fn assess(cloud: &Cloud, normals: &[Vec3], walls: &[PlacedWall], found: &Found, settings: &Settings) -> Outcome {
-    let (block, blocks) =
-        blocks(walls.iter().map(|w| w.p), BLOCK * settings.grid * (settings.neighbours as f64).sqrt());
+fn assess(surface: &Surface, walls: &[PlacedWall], found: &Found, settings: &Settings) -> Outcome {
+    let side = BLOCK * settings.grid * (settings.neighbours as f64).sqrt();
+    let (block, blocks) = blocks(walls.iter().map(|w| w.p), side);
     let place = |(w, block): (&PlacedWall, &usize)| Place { rho: w.rho(), z: w.p.z, angle: w.angle(), block: *block };
     let places: Vec<Place> = walls.iter().zip(&block).map(place).collect();
     let profile = fit_profile(&places, blocks);
-    let shares = shares(cloud, normals, &found.pose, &profile, 3.0 * profile.misfit + 0.5 * settings.grid);
-    let evidence = Evidence::of(walls, found.direction.spread, found.count.1, found.count.0, shares.behind());
-    evidence.judge()?;
+    let (cloud, normals) = (&surface.cloud, &surface.normals);
+    let coverage = coverage(cloud, normals, &found.pose, &profile, 3.0 * profile.misfit + 0.5 * settings.grid);
+    let counts = [cloud.points.len(), found.candidates];
+    let evidence = Evidence::of(walls, counts, found.direction.spread, coverage.behind());
+    evidence.judge(found.view)?;
+    profile.judge(&found.pose, found.view)?;
     let scatter = Scatter {
         pose: &found.pose,
         e1: &walls.iter().map(|w| w.e1).collect::<Vec<_>>(),
@@ -134,12 +166,12 @@ fn assess(cloud: &Cloud, normals: &[Vec3], walls: &[PlacedWall], found: &Found, 
         height: walls.iter().map(|w| w.p.z).sum::<f64>() / walls.len() as f64,
         agreement: settings.agreement,
     };
-    let covariance = scatter.covariance();
-    Ok(Located { pose: found.pose, covariance, profile, shares, evidence, timing: Vec::new() })
+    let covariance = scatter.covariance()?;
+    Ok(Located { pose: found.pose, covariance, profile, coverage, evidence, timing: Vec::new() })
 }
 
-/// Side of the blocks whose errors are independent, in units of grid·√k: four times a neighbourhood's radius.
-const BLOCK: f64 = 2.3;
+/// Side of the blocks whose errors are independent, in units of grid·√k: a neighbourhood's diameter.
+const BLOCK: f64 = 1.15;
 
 /// Milliseconds between the steps.
 struct Clock {
@@ -152,8 +184,13 @@ impl Clock {
         Self { last: Instant::now(), laps: Vec::new() }
     }
 
+    /// Adds the time since the last lap to a step's.
     fn lap(&mut self, step: &'static str) {
-        self.laps.push((step, self.last.elapsed().as_secs_f64() * 1e3));
+        let elapsed = self.last.elapsed().as_secs_f64() * 1e3;
+        match self.laps.iter_mut().find(|(name, _)| *name == step) {
+            Some((_, time)) => *time += elapsed,
+            None => self.laps.push((step, elapsed)),
+        }
         self.last = Instant::now();
     }
 }

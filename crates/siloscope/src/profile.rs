@@ -1,7 +1,11 @@
 //! The silo's profile about a known axis: the cylinder's radius and the cone, as far as walls are seen.
 
+use crate::SiloPose;
 use crate::axis::median;
 use crate::blocks::sums;
+use crate::candidates::View;
+use crate::coarse::FEED_SLOPE;
+use crate::refusal::Refusal;
 use crate::surface::Cone;
 use nalgebra::{Matrix2, Vector2};
 
@@ -130,6 +134,22 @@ impl Profile {
                 }
             }
             (_, cylinder, cone) => cylinder.or(cone).unwrap_or((f64::NAN, f64::NAN)),
+        }
+    }
+
+    /// Whether there is a wall at all, no cone that may be feed, and the camera on the side from which it was seen.
+    pub fn judge(&self, pose: &SiloPose, view: View) -> Result<(), Refusal> {
+        let inside = self.distance(pose.t_x.hypot(pose.t_y), 0.0).0 < 0.0;
+        let possible = match view {
+            View::Either => self.radius.is_some() || self.cone.is_some(),
+            View::Inside => inside,
+            View::Outside => self.radius.is_some() && !inside,
+        };
+        let feed = self.radius.is_none() && self.cone.is_some_and(|cone| cone.slope > FEED_SLOPE);
+        match (possible, feed) {
+            (false, _) => Err(Refusal::NoWall),
+            (true, true) => Err(Refusal::ConeMayBeFeed),
+            (true, false) => Ok(()),
         }
     }
 

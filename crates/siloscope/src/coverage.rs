@@ -7,14 +7,14 @@ use crate::{SiloPose, Vec3};
 
 /// Pixels and surface by label (`labels`), the surface in units of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Shares {
+pub struct Coverage {
     /// Number of pixels with each label.
     pub pixels: [f64; 5],
     /// Surface with each label.
     pub areas: [f64; 5],
 }
 
-impl Shares {
+impl Coverage {
     /// Share of the pixels that lie behind the wall, where nothing can be.
     pub fn behind(&self) -> f64 {
         self.pixels[OTHER as usize] / self.pixels.iter().sum::<f64>().max(1.0)
@@ -26,10 +26,10 @@ impl Shares {
 /// A voxel within `tolerance` metres of the wall is wall, one before it is feed, one behind it something else. A pixel
 /// at depth z covers z²/|n·q| of a surface with normal n, q being the ray (x/z, y/z, 1): of the wall's own normal
 /// where it is wall, else of the voxel's. All pixels are taken as equally large.
-pub fn shares(cloud: &Cloud, normals: &[Vec3], pose: &SiloPose, profile: &Profile, tolerance: f64) -> Shares {
+pub fn coverage(cloud: &Cloud, normals: &[Vec3], pose: &SiloPose, profile: &Profile, tolerance: f64) -> Coverage {
     let turn = pose.rotation();
     let shift = Vec3::new(pose.t_x, pose.t_y, 0.0);
-    let mut shares = Shares::default();
+    let mut seen = Coverage::default();
     for ((p, normal), count) in cloud.points.iter().zip(normals).zip(&cloud.counts) {
         let placed = turn * p + shift;
         let rho = placed.x.hypot(placed.y);
@@ -40,10 +40,10 @@ pub fn shares(cloud: &Cloud, normals: &[Vec3], pose: &SiloPose, profile: &Profil
             _ => normal.dot(p),
         };
         let pixels = f64::from(*count);
-        shares.pixels[label as usize] += pixels;
-        shares.areas[label as usize] += pixels * p.z.powi(3) / facing.abs().max(0.02 * p.norm());
+        seen.pixels[label as usize] += pixels;
+        seen.areas[label as usize] += pixels * p.z.powi(3) / facing.abs().max(0.02 * p.norm());
     }
-    shares
+    seen
 }
 
 fn label(off: f64, cone: bool, tolerance: f64) -> u8 {
