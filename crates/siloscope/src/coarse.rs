@@ -89,7 +89,7 @@ fn settled(problem: &Problem, mut fit: Fit) -> Result<(Fit, WallEvidence), Refus
     }
     let wall = wall_patches(problem, &fit);
     let evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
-    judge(&evidence, fit.inside).map(|()| (fit, evidence))
+    judge(&evidence, fit.inside, problem.patches.cloud).map(|()| (fit, evidence))
 }
 
 /// Whether something else lies well before the cone all around its vertex: then the cone is no surface of feed.
@@ -113,16 +113,23 @@ fn apex_is_covered(problem: &Problem, fit: &Fit) -> bool {
 }
 
 /// What has to hold on a wall of revolution.
-fn judge(e: &WallEvidence, inside: bool) -> Result<(), Refusal> {
+///
+/// Tiles of an image measure it to a hundredth; the normals of a cloud come from few points, and both bend and turn less
+/// than their surface.
+fn judge(e: &WallEvidence, inside: bool, cloud: bool) -> Result<(), Refusal> {
     if e.patches < 20 || e.arc < 0.5 {
         return Err(Refusal::NoWall);
     }
-    let turns = (e.turn - 1.0).abs() < 0.2 + 3.0 * e.turn_std.min(0.1);
+    let [turn, bend] = match (cloud, inside) {
+        (true, true) => [0.2, 0.12],
+        (true, false) => [0.2, 0.08],
+        (false, _) => [0.06, 0.05],
+    };
+    let turns = (e.turn - 1.0).abs() < turn + 3.0 * e.turn_std.min(0.03);
     if !turns {
         return Err(Refusal::Flat);
     }
-    let limit = if inside { 0.12 } else { 0.08 };
-    let straight = e.bend.abs() < limit + 3.0 * e.bend_std.min(0.1);
+    let straight = e.bend.abs() < bend + 3.0 * e.bend_std.min(0.02);
     if !straight {
         return Err(Refusal::Bent);
     }
@@ -166,6 +173,22 @@ fn likelihood(problem: &Problem, fit: &Fit) -> f64 {
         equation.map_or(0.0, |e| weight * (0.5 / (e.variance.sqrt() * e.cosine)).ln().max(0.0))
     };
     fit.weights.iter().enumerate().map(gain).sum()
+}
+
+/// Leaves out a part of which hardly any wall patch is left: its parameters would be undetermined.
+pub fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
+    const ENOUGH: usize = 12;
+    let placed = PlacedSurface::new(fit.surface);
+    let seen = (0..wall.len()).filter(|&i| wall[i]).filter_map(|i| problem.equation(fit, &placed, i));
+    let (cylinder, cone) = seen.fold((0, 0), |(cylinder, cone), e| match e.part {
+        Part::Cylinder => (cylinder + 1, cone),
+        Part::Cone => (cylinder, cone + 1),
+    });
+    if cone < ENOUGH && cylinder >= ENOUGH {
+        fit.surface.cone = None;
+    } else if cylinder < ENOUGH && cone >= ENOUGH {
+        fit.surface.radius = None;
+    }
 }
 
 /// Patches that agree with the wall and whose neighbours do too: the seam with feed or clutter is left out.

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::Vec3;
 use crate::cloud::cloud_patches;
-use crate::coarse::{coarse_fit, wall_patches};
+use crate::coarse::{coarse_fit, drop_bare_parts, wall_patches};
 use crate::covariance::{relief_uncertainty, scale_uncertainty, widened};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{ALL, TileEquation, moved, patch_equations, pixel_equations, polish, solve_equations};
@@ -73,6 +73,7 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     }
     let mut problem = Problem { patches: &patches, noise, prior: &prior, pixel };
     let wall = wall_patches(&problem, &fit);
+    drop_bare_parts(&problem, &mut fit, &wall);
     for reach in [3.0, 2.0] {
         problem.noise = polish(&problem, image, &mut fit, &wall, reach, know.error.noise);
     }
@@ -137,13 +138,15 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
     let exact = DepthError { bias: DepthBias::default(), bias_std: [0.0; 3], noise: None };
     let prior = prior(&Knowledge { error: exact, ..know.clone() });
     let noise = NoiseLaw::uniform(1e-3); // not used: patches of a cloud carry their own scatter
-    let (fit, evidence) = match coarse_fit(&mut patches, noise, &prior, 0.0) {
+    let (mut fit, evidence) = match coarse_fit(&mut patches, noise, &prior, 0.0) {
         Ok(found) => found,
         Err(refusal) => return Ok(Err(refusal)),
     };
     clock.lap("coarse fit");
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
-    let equations = patch_equations(&problem, &fit, &wall_patches(&problem, &fit));
+    let wall = wall_patches(&problem, &fit);
+    drop_bare_parts(&problem, &mut fit, &wall);
+    let equations = patch_equations(&problem, &fit, &wall);
     let Some(mut result) = finish(&problem, fit, &equations, evidence, false) else {
         return Ok(Err(Refusal::PoorlyDetermined));
     };
