@@ -16,7 +16,7 @@ from siloscope.scene import ASTRA_S
 def main() -> None:
     """Locates the paper's second silo, seen by a sensor with the Astra S's bias and noise."""
     seen = replace(scenario("silo2"), sensor=ASTRA_S, seed=1).render()
-    for method, sensor in (("surface", "orbbec-astra-s"),):
+    for method, sensor in (("surface", "orbbec-astra-s"), ("shape-tensor", None)):
         estimate = siloscope.locate(seen.frame(), method=method, sensor=sensor)
         if estimate.pose is None:
             print(f"{method:13s} refused: {estimate.message}")

@@ -52,7 +52,7 @@ def arguments(place: Path, name: str) -> list[str]:
 
 
 @pytest.mark.parametrize("method", METHODS)
-@pytest.mark.parametrize("name", ["frame.png", "frame.npy"])
+@pytest.mark.parametrize("name", ["frame.png", "frame.npy", "cloud.ply"])
 def test_every_format_gives_the_pose(place: Path, name: str, method: str, capsys: Shown) -> None:
     code, document = answer([*arguments(place, name), "--method", method], capsys)
     assert code == 0
@@ -79,7 +79,7 @@ def test_out_has_cloud_document_and_pictures(place: Path, tmp_path: Path, capsys
     assert code == 0
     assert json.loads((out / "estimate.json").read_text()) == document
     assert (out / "adjusted.ply").read_bytes().startswith(b"ply")
-    for name in ("overview", "depth", "clouds", "profile"):
+    for name in ("overview", "depth", "clouds", "candidates", "directions", "profile"):
         with Image.open(out / f"{name}.png") as image:
             assert min(image.size) > 300
 

@@ -44,7 +44,7 @@ def test_every_example_is_tested() -> None:
 def test_simulated(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     run("locate_simulated", monkeypatch=monkeypatch)
     lines = capsys.readouterr().out.splitlines()
-    assert [line.split()[0] for line in lines] == ["surface"]
+    assert [line.split()[0] for line in lines] == ["surface", "shape-tensor"]
     assert all("Eq. 11" in line for line in lines)
 
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from siloscope import writers
 from siloscope.camera import Camera
+from siloscope.errors import SiloscopeError
 from siloscope.estimate import Estimate
 from siloscope.frame import Frame
 from siloscope.pose import SiloPose
@@ -102,8 +103,32 @@ def pictures(frame: Frame, estimate: Estimate, mask: Mask | None = None) -> dict
     if depth is not None:
         made["overview"] = plots.overview(depth, points, corrected, estimate.pose, estimate.silo)
     made["clouds"] = plots.clouds(points, corrected, estimate.pose, estimate.silo)
+    made |= _steps(corrected, estimate, estimate.pose)
     made["profile"] = _profile(corrected, estimate, estimate.pose)
     return made
+
+
+PAIRS = 20_000
+"""Pairs of candidates whose estimated vectors are drawn."""
+
+
+def _steps(points: NDArray[np.float64], estimate: Estimate, pose: SiloPose) -> dict[str, Figure]:
+    """Steps 3 and 4 of the paper on the frame's cloud; nothing where it is too small for them."""
+    from siloscope import plots, steps
+    from siloscope.surface import cell_size
+
+    grid = estimate.config.get("grid") or cell_size(points)
+    try:
+        between = steps.run(points, grid=grid, neighbours=estimate.config.get("neighbours", steps.NEIGHBOURS))
+    except SiloscopeError:
+        return {}
+    chosen = np.zeros(len(between.points), np.bool_)
+    chosen[between.candidates.index] = True
+    vectors = steps.estimated_vectors(between.candidates.E1, PAIRS)
+    return {
+        "candidates": plots.candidates(between.points, chosen, pose, estimate.silo),
+        "directions": plots.directions(vectors, pose.axis_direction),
+    }
 
 
 def _profile(points: NDArray[np.float64], estimate: Estimate, pose: SiloPose) -> Figure:

@@ -19,8 +19,8 @@ from siloscope.paper.metrics import pc_average_distance, transform_error
 from siloscope.paper.scenarios import looking_at
 from siloscope.scene import ASTRA_S, Feed, Scene, Silo, SimulatedFrame, discharge
 
-METHODS = ("surface",)
-"""The methods that are compared."""
+METHODS = ("surface", "shape-tensor")
+"""What is compared: the default method and the paper's six steps."""
 
 SENSOR = "orbbec-astra-s"
 """The profile that the `surface` method is told; the simulated sensor has its bias and noise (Eqs. 8 and 9)."""
