@@ -16,6 +16,7 @@ import tempfile
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 from PIL import Image
@@ -23,12 +24,14 @@ from rich.console import Console
 from rich.table import Table
 
 import siloscope
+from siloscope import steps
 from siloscope.camera import Camera
 from siloscope.paper.scenarios import scenario
+from siloscope.region import frame_points
 from siloscope.scene import ASTRA_S, Scene, SimulatedFrame
 
 SCENARIOS = ("silo1", "silo2", "silo-r1")
-METHODS: tuple[tuple[str, str | None], ...] = (("surface", "orbbec-astra-s"),)
+METHODS: tuple[tuple[str, str | None], ...] = (("surface", "orbbec-astra-s"), ("shape-tensor", None))
 
 
 def main() -> None:
@@ -42,6 +45,7 @@ def main() -> None:
     console.print(whole_times(frames, decode, repeat))
     for method, sensor in METHODS:
         console.print(step_times(frames, method, sensor, repeat))
+    console.print(six_steps(repeat))
     console.print(scaling(repeat))
     console.print(start_up(repeat))
     console.print(memory(frames))
@@ -98,6 +102,37 @@ def step_times(frames: Sequence[SimulatedFrame], method: str, sensor: str | None
         middles = [statistics.median(timing.get(step, 0.0) for timing in timings) for timings in runs]
         table.add_row(step, *[f"{value:.3f}" for value in middles])
     return table
+
+
+def six_steps(repeat: int) -> Table:
+    """The six steps on perfect frames: by point of the voxel grid, and against the slow NumPy reference."""
+    reference = slow_reference()
+    table = Table(title="shape-tensor on perfect frames", title_justify="left")
+    table.add_column("")
+    rows: dict[str, list[str]] = {
+        name: [] for name in ("grid points", "ms", "µs a point", "reference, ms", "times faster")
+    }
+    for name in SCENARIOS:
+        table.add_column(name, justify="right")
+        seen = scenario(name).render(threads=2)
+        points = frame_points(seen.frame()).reshape(-1, 3)
+        count = len(steps.voxel_grid(points))
+        taken = milliseconds(lambda: located(seen, "shape-tensor", None), repeat)  # noqa: B023
+        slow = milliseconds(lambda: reference(points), 1)  # noqa: B023
+        cells = (f"{count}", f"{taken:.2f}", f"{1e3 * taken / count:.2f}", f"{slow:.0f}", f"{slow / taken:.0f}")
+        for row, cell in zip(rows.values(), cells, strict=True):
+            row.append(cell)
+    for name, row in rows.items():
+        table.add_row(name, *row)
+    return table
+
+
+def slow_reference() -> Callable[[np.ndarray], np.ndarray]:
+    """The tests' oracle."""
+    sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
+    import reference
+
+    return lambda points: reference.locate(points[np.isfinite(points).all(axis=1)])
 
 
 def scaling(repeat: int) -> Table:
