@@ -78,3 +78,12 @@ format: $(VENV)/.installed ## formats all code
 
 clean: ## removes what was built, but not .venv
 	rm -rf target build dist site demo
+
+.PHONY: results peers
+
+results: build ## repeats the paper's evaluation and writes docs/results.md
+	$(BIN)/siloscope reproduce all --out docs
+
+peers: build ## installs other libraries beside the project, runs them on the same frames, writes docs/peers.md
+	$(BIN)/python benchmarks/peers/install.py
+	$(BIN)/python benchmarks/peers/run.py --out docs

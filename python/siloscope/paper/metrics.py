@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -86,6 +87,19 @@ def pc_average_distance(
     UsageError
         Where the depth (H, W) is not of the camera's size or holds no measurement, or the stride is below 1.
     """
+    return pc_average_distances([estimate], reference, depth, camera, stride=stride, threads=threads)[0]
+
+
+def pc_average_distances(
+    estimates: Sequence[SiloPose],
+    reference: SiloPose,
+    depth: NDArray[np.floating[Any]],
+    camera: Camera,
+    *,
+    stride: int = 1,
+    threads: int = 1,
+) -> list[float]:
+    """PC average distance of each of several estimates of one frame; the reference cloud is indexed only once."""
     if depth.shape != (camera.height, camera.width):
         raise UsageError(f"depth has the shape {depth.shape}, the camera is {camera.height} x {camera.width}")
     if stride < 1:
@@ -93,8 +107,11 @@ def pc_average_distance(
     valid = np.isfinite(depth) & (depth > 0)
     if not valid.any():
         raise UsageError("the frame has no pixel with depth to compare")
+    if not estimates:
+        return []
     points = camera_points(depth, camera)[valid]
-    return cloud_distance(estimate.to_silo(points[::stride]), reference.to_silo(points), threads)
+    adjusted = [estimate.to_silo(points[::stride]) for estimate in estimates]
+    return cloud_distances(adjusted, reference.to_silo(points), threads)
 
 
 def cloud_distance(points: NDArray[np.float64], reference: NDArray[np.float64], threads: int = 1) -> float:
@@ -105,12 +122,21 @@ def cloud_distance(points: NDArray[np.float64], reference: NDArray[np.float64], 
     UsageError
         Where a cloud is empty, has another shape, or holds NaN or infinite coordinates.
     """
-    if len(points) == 0:
+    return cloud_distances([points], reference, threads)[0]
+
+
+def cloud_distances(
+    clouds: Sequence[NDArray[np.float64]], reference: NDArray[np.float64], threads: int = 1
+) -> list[float]:
+    """`cloud_distance` of each of several clouds; the reference is indexed only once."""
+    if any(len(points) == 0 for points in clouds):
         raise UsageError("there is no point to compare")
     try:
-        return float(_core.nearest_distances(points, reference, threads).mean())
+        distances = _core.nearest_distances(np.concatenate(clouds), reference, threads)
     except (TypeError, ValueError) as error:
         raise UsageError(f"clouds can't be compared: {error}") from None
+    ends = np.cumsum([len(points) for points in clouds])[:-1]
+    return [float(part.mean()) for part in np.split(distances, ends)]
 
 
 def camera_points(depth: NDArray[np.floating[Any]], camera: Camera) -> NDArray[np.float64]:

@@ -1,0 +1,37 @@
+"""Pictures that several chapters have; drawing imports matplotlib only when a picture is written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from siloscope.paper.evaluation.chapter import Picture
+from siloscope.paper.evaluation.series import Series
+from siloscope.pose import SiloPose
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def curves(name: str, caption: str, series: Sequence[Series], title: str) -> Picture:
+    """Errors, shares and distances over the discharge."""
+
+    def draw() -> Figure:
+        from siloscope.paper.evaluation import figures
+
+        return figures.discharges(series, title)
+
+    return Picture(name, caption, draw)
+
+
+def clouds(
+    name: str, caption: str, series: Sequence[Series], poses: Mapping[str, SiloPose | None], title: str
+) -> Picture:
+    """Each silo's last frame adjusted with the true pose and with the estimated one."""
+
+    def draw() -> Figure:
+        from siloscope.paper.evaluation import figures
+
+        return figures.adjusted({one.name: one.observations[-1].scene for one in series}, poses, title)
+
+    return Picture(name, caption, draw)

@@ -1,0 +1,46 @@
+"""The columns of the tables: what a method is told about the silo and its sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from siloscope.estimate import Estimate
+from siloscope.locate import locate
+from siloscope.scene import SimulatedFrame
+from siloscope.sensors import SensorProfile
+
+
+@dataclass(frozen=True)
+class Solver:
+    """A method and what it is told."""
+
+    name: str
+    heading: str
+    method: str
+    knows_diameter: bool = False
+    knows_profile: bool = False
+
+    def __call__(self, frame: SimulatedFrame, profile: SensorProfile, **more: Any) -> Estimate:
+        """The pose of a frame taken with a sensor of this profile."""
+        known: dict[str, Any] = dict(more)
+        if self.knows_diameter:
+            known["diameter"] = 2.0 * frame.scene.silo.radius
+        if self.knows_profile:
+            known["sensor"] = profile
+        return locate(frame.measured, frame.camera, method=self.method, **known)
+
+
+SOLVERS = {
+    solver.name: solver
+    for solver in (
+        Solver("shape-tensor", "shape-tensor", "shape-tensor"),
+        Solver("surface", "surface", "surface"),
+        Solver("surface-diameter", "surface, diameter known", "surface", knows_diameter=True),
+        Solver("surface-profile", "surface, profile known", "surface", knows_profile=True),
+    )
+}
+"""Solvers by name, in the tables' order; plain `surface` knows neither diameter nor profile."""
+
+ALL = tuple(SOLVERS)
+SURFACE = tuple(name for name, solver in SOLVERS.items() if solver.method == "surface")
