@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-import reference
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+import reference
 from siloscope import InputError, SiloPose, UsageError, steps
 from siloscope.paper.scenarios import scenario
 
