@@ -3,6 +3,7 @@
 use pyo3::prelude::*;
 
 mod camera;
+mod content;
 mod convert;
 mod depth;
 mod files;
@@ -16,6 +17,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     camera::register(m)?;
     depth::register(m)?;
+    content::register(m)?;
     files::register(m)?;
     scene::register(m)?;
     surface::register(m)?;

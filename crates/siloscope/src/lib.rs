@@ -15,6 +15,7 @@ pub mod coarse;
 pub mod covariance;
 pub mod coverage;
 pub mod eigen;
+pub mod content;
 pub mod error;
 pub mod evidence;
 pub mod fit;

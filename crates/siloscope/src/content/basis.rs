@@ -1,0 +1,258 @@
+//! What a feed surface is made of: a level, a tilt, a profile about a centre, and a smooth rest.
+//!
+//! In units of the silo's radius, `z(u, v) = a + b u + c v + s ρ + Σ δ_k (ρ - ρ_k)₊ + Σ g_j B_j(u, v)`, where ρ is the
+//! distance from the heap's centre. Bulk solids lie at about one angle, so the profile's slope is a random walk over ρ;
+//! the rest is a Matérn field (smoothness 3/2, range one radius) on a lattice of cubic B-splines. Where nothing is seen
+//! the surface goes on with the slope it had, and what it may do instead grows with the distance.
+
+use nalgebra::DMatrix;
+use std::sync::OnceLock;
+
+/// Distance between the profile's knots.
+const KNOT: f64 = 0.1;
+/// Most knots of a profile: those of a heap at the wall.
+const MOST_KNOTS: usize = 20;
+/// Distance between the lattice's points.
+const PITCH: f64 = 1.0 / 3.0;
+/// Lattice points along a side: those whose splines reach into [-1, 1].
+const SIDE: usize = 9;
+/// Lattice points farther out have less than a millionth of a weight in the disc.
+const OUTERMOST: f64 = 1.7;
+/// Standard deviation of the level, of the tilt's slopes, and of the profile's slope at the centre.
+const LEVEL: f64 = 10.0;
+const TILT: f64 = 0.3;
+const SLOPE: f64 = 0.5;
+/// Functions before the knots.
+const FIRST: usize = 4;
+/// Functions that are not zero at one place, at most.
+const ROW: usize = FIRST + MOST_KNOTS + 16;
+
+/// How much the surface may bend and how irregular it may be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Roughness {
+    /// Standard deviation of the change of the profile's slope over one radius.
+    pub bend: f64,
+    /// Standard deviation of the smooth rest, in radii.
+    pub rest: f64,
+}
+
+/// The functions of a surface about one centre.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Basis {
+    /// Centre of the profile, in radii.
+    pub centre: [f64; 2],
+    knots: usize,
+}
+
+/// The functions that are not zero at a place, with their derivatives along u and v.
+#[derive(Debug, Clone)]
+pub struct Row {
+    len: usize,
+    index: [usize; ROW],
+    jet: [[f64; 3]; ROW],
+}
+
+impl Row {
+    fn push(&mut self, index: usize, jet: [f64; 3]) {
+        if let (Some(i), Some(j)) = (self.index.get_mut(self.len), self.jet.get_mut(self.len)) {
+            (*i, *j) = (index, jet);
+            self.len += 1;
+        }
+    }
+
+    /// Index, value and derivatives of each function.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &[f64; 3])> {
+        self.index.iter().copied().zip(&self.jet).take(self.len)
+    }
+
+    /// Value and derivatives of a surface.
+    pub fn jet(&self, coefficients: &[f64]) -> [f64; 3] {
+        self.iter().fold([0.0; 3], |sum, (i, jet)| {
+            let c = coefficients.get(i).copied().unwrap_or(0.0);
+            [sum[0] + c * jet[0], sum[1] + c * jet[1], sum[2] + c * jet[2]]
+        })
+    }
+}
+
+impl Basis {
+    /// The functions of a surface whose profile has its centre at most one radius from the axis.
+    pub fn new(centre: [f64; 2]) -> Self {
+        let reach = 1.0 + centre[0].hypot(centre[1]);
+        let knots = ((reach / KNOT).ceil() as usize).saturating_sub(1).min(MOST_KNOTS);
+        Self { centre, knots }
+    }
+
+    /// Number of functions.
+    pub fn len(&self) -> usize {
+        FIRST + self.knots + lattice().points.len()
+    }
+
+    /// The functions at a place.
+    pub fn row(&self, [u, v]: [f64; 2]) -> Row {
+        let mut row = Row { len: 0, index: [0; ROW], jet: [[0.0; 3]; ROW] };
+        row.push(0, [1.0, 0.0, 0.0]);
+        row.push(1, [u, 1.0, 0.0]);
+        row.push(2, [v, 0.0, 1.0]);
+        self.profile([u - self.centre[0], v - self.centre[1]], &mut row);
+        self.rest([u, v], &mut row);
+        row
+    }
+
+    fn profile(&self, [u, v]: [f64; 2], row: &mut Row) {
+        let rho = u.hypot(v);
+        let slope = if rho > 1e-12 { [u / rho, v / rho] } else { [0.0; 2] };
+        for k in 0..=self.knots {
+            let beyond = rho - k as f64 * KNOT;
+            if beyond <= 0.0 && k > 0 {
+                break;
+            }
+            row.push(FIRST - 1 + k, [beyond, slope[0], slope[1]]);
+        }
+    }
+
+    fn rest(&self, [u, v]: [f64; 2], row: &mut Row) {
+        let ((column, x), (line, y)) = (cell(u), cell(v));
+        let (wx, sx, wy, sy) = (spline(x), spline_slope(x), spline(y), spline_slope(y));
+        for j in 0..4 {
+            for i in 0..4 {
+                if let Some(place) = lattice().place(column + i, line + j) {
+                    let jet = [wx[i] * wy[j], sx[i] * wy[j] / PITCH, wx[i] * sy[j] / PITCH];
+                    row.push(FIRST + self.knots + place, jet);
+                }
+            }
+        }
+    }
+
+    /// Precision of the coefficients before anything is seen, and the logarithm of its determinant.
+    pub fn precision(&self, roughness: Roughness) -> (DMatrix<f64>, f64) {
+        let n = self.len();
+        let mut q = DMatrix::zeros(n, n);
+        let bend = 1.0 / (roughness.bend * roughness.bend * KNOT);
+        let first = [LEVEL, TILT, TILT, SLOPE].map(|std: f64| 1.0 / (std * std));
+        let diagonal = first.into_iter().chain(std::iter::repeat_n(bend, self.knots));
+        let mut log = 0.0;
+        for (i, value) in diagonal.enumerate() {
+            q[(i, i)] = value;
+            log += value.ln();
+        }
+        let lattice = lattice();
+        let m = lattice.points.len();
+        let scale = 1.0 / (roughness.rest * roughness.rest);
+        q.view_mut((n - m, n - m), (m, m)).copy_from(&(&lattice.precision * scale));
+        (q, log + lattice.log_determinant + m as f64 * scale.ln())
+    }
+}
+
+/// The lattice's points near the disc and the precision of a Matérn field of variance 1 on them.
+struct Lattice {
+    points: Vec<[f64; 2]>,
+    places: [Option<usize>; SIDE * SIDE],
+    precision: DMatrix<f64>,
+    log_determinant: f64,
+}
+
+impl Lattice {
+    fn place(&self, column: usize, line: usize) -> Option<usize> {
+        self.places.get(line * SIDE + column).copied().flatten()
+    }
+}
+
+/// The same for all surfaces, so it is worked out once.
+fn lattice() -> &'static Lattice {
+    static LATTICE: OnceLock<Lattice> = OnceLock::new();
+    LATTICE.get_or_init(|| {
+        let at = |i: usize| i as f64 * PITCH - 1.0 - PITCH;
+        let (mut points, mut places) = (Vec::new(), [None; SIDE * SIDE]);
+        for (i, place) in places.iter_mut().enumerate() {
+            let point = [at(i % SIDE), at(i / SIDE)];
+            if point[0].hypot(point[1]) <= OUTERMOST {
+                *place = Some(points.len());
+                points.push(point);
+            }
+        }
+        let (precision, log_determinant) = matern_precision(&points);
+        Lattice { points, places, precision, log_determinant }
+    })
+}
+
+/// Inverse of `k(d) = (1 + √3 d) exp(-√3 d)` between the points, and the logarithm of the inverse's determinant.
+fn matern_precision(points: &[[f64; 2]]) -> (DMatrix<f64>, f64) {
+    let n = points.len();
+    let covariance = DMatrix::from_fn(n, n, |i, j| {
+        let (a, b) = (points[i], points[j]);
+        let d = 3f64.sqrt() * (a[0] - b[0]).hypot(a[1] - b[1]);
+        (1.0 + d) * (-d).exp()
+    });
+    match covariance.cholesky() {
+        Some(factor) => (factor.inverse(), -factor.ln_determinant()),
+        None => (DMatrix::identity(n, n), 0.0), // a Matérn matrix of distinct points always has a factor
+    }
+}
+
+/// Lattice interval of a coordinate and the place in it; outside [-1, 1] the edge's polynomial goes on.
+fn cell(u: f64) -> (usize, f64) {
+    let s = (u + 1.0) / PITCH;
+    let i = s.clamp(0.0, (SIDE - 4) as f64).floor();
+    (i as usize, s - i)
+}
+
+/// Weights of the uniform cubic B-spline.
+fn spline(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [
+        s * s * s / 6.0,
+        (t * t * (3.0 * t - 6.0) + 4.0) / 6.0,
+        (s * s * (3.0 * s - 6.0) + 4.0) / 6.0,
+        t * t * t / 6.0,
+    ]
+}
+
+fn spline_slope(t: f64) -> [f64; 4] {
+    let s = 1.0 - t;
+    [-s * s / 2.0, t * (3.0 * t - 4.0) / 2.0, s * (4.0 - 3.0 * s) / 2.0, t * t / 2.0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn slopes_are_the_derivatives(u in -0.9f64..0.9, v in -0.9f64..0.9, seed in 0u64..1000) {
+            let basis = Basis::new([0.21, -0.4]);
+            let c: Vec<f64> = (0..basis.len()).map(|i| ((seed + 1) as f64 * (i as f64 + 0.7)).sin()).collect();
+            let rho = (u - 0.21).hypot(v + 0.4);
+            prop_assume!((rho / KNOT - (rho / KNOT).round()).abs() > 1e-3);
+            let at = |u, v| basis.row([u, v]).jet(&c)[0];
+            let [_, du, dv] = basis.row([u, v]).jet(&c);
+            let h = 1e-6;
+            prop_assert!((du - (at(u + h, v) - at(u - h, v)) / (2.0 * h)).abs() < 1e-5);
+            prop_assert!((dv - (at(u, v + h) - at(u, v - h)) / (2.0 * h)).abs() < 1e-5);
+        }
+
+        #[test]
+        fn splines_add_up_to_one(u in -1.0f64..1.0, v in -1.0f64..1.0) {
+            let basis = Basis::new([0.0, 0.0]);
+            let sum: f64 = basis.row([u, v]).iter().filter(|(i, _)| *i >= FIRST + basis.knots).map(|(_, jet)| jet[0]).sum();
+            prop_assume!(u.hypot(v) < 1.0);
+            prop_assert!((sum - 1.0).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn the_precision_has_the_determinant_it_says() {
+        let basis = Basis::new([0.0, 0.0]);
+        let (q, log) = basis.precision(Roughness { bend: 0.4, rest: 0.03 });
+        assert_eq!(q.nrows(), basis.len());
+        let Some(factor) = q.cholesky() else { panic!("positive definite") };
+        assert!((factor.ln_determinant() - log).abs() < 1e-6 * log.abs());
+    }
+
+    #[test]
+    fn the_row_has_room_for_a_heap_at_the_wall() {
+        let basis = Basis::new([1.0, 0.0]);
+        assert_eq!(basis.knots, 19);
+        assert!(basis.row([-0.99, 0.0]).len < ROW);
+    }
+}

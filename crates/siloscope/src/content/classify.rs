@@ -1,0 +1,167 @@
+//! Which cells show the content, which the bare cone, and which something else.
+
+use super::cells::Cell;
+use super::doubt::{Covariance, Lever, deviation};
+use super::fit::{Surface, fit};
+use super::grid::Grid;
+use super::vessel::Vessel;
+use super::volume::Kind;
+
+/// A cell shows content where its mean lies so many standard deviations above the floor.
+const SIGMAS: f64 = 4.0;
+/// Rounds of fitting and of leaving out the cells through which the content's rim runs.
+const ROUNDS: usize = 2;
+/// A cell is clear of the rim where the content under its middle is thicker than this many cells times its rise.
+const CLEAR: f64 = 0.75;
+/// Steepest climb between neighbouring cells of one surface: tan 65°; feed at rest never lies so steep.
+const STEEPEST: f64 = 2.1;
+
+/// The cells' kinds and the surface through those that show content.
+#[derive(Debug, Clone)]
+pub struct Classified {
+    /// One for each cell.
+    pub kinds: Vec<Kind>,
+    /// None where hardly any cell shows content.
+    pub surface: Option<Surface>,
+    /// Things above the surface, by size.
+    pub things: Vec<Thing>,
+}
+
+/// Neighbouring cells that float above the surface.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Thing {
+    /// Its cells.
+    pub cells: Vec<usize>,
+    /// Mean height above the surface, metres.
+    pub above: f64,
+    /// Whether it reaches the silo's wall.
+    pub at_wall: bool,
+}
+
+/// What the cells are compared with.
+#[derive(Debug, Clone, Copy)]
+pub struct Floor<'a> {
+    /// The silo.
+    pub vessel: &'a Vessel,
+    /// The pose's derivatives.
+    pub lever: &'a Lever,
+    /// How well pose, geometry and depth are known.
+    pub covariance: &'a Covariance,
+    /// How uneven the wall is, metres (standard deviation).
+    pub wall_std: f64,
+}
+
+impl Floor<'_> {
+    /// Whether a cell's mean lies surely above the floor.
+    fn covered(&self, cell: &Cell) -> bool {
+        let thickness = self.vessel.floor(cell.radius) - cell.mean[2];
+        let known = deviation(&self.lever.thickness(cell.mean, self.vessel), self.covariance);
+        let noise = cell.noise / cell.count + self.wall_std * self.wall_std;
+        thickness > SIGMAS * (known * known + noise).sqrt()
+    }
+}
+
+/// Sorts the cells and fits the surface.
+pub fn classify(grid: &Grid, cells: &[Cell], floor: &Floor<'_>) -> Classified {
+    let covered: Vec<bool> = cells.iter().map(|c| c.seen() && floor.covered(c)).collect();
+    let things_of = |surface: &Surface, main: &[bool]| things(grid, cells, &covered, main, surface, floor.vessel);
+    let main = main_part(grid, cells, &covered);
+    let mut take = main.clone();
+    let mut surface = fit(grid, cells, &take);
+    let mut things = Vec::new();
+    for _ in 0..ROUNDS {
+        let Some(found) = &surface else { break };
+        things = things_of(found, &main);
+        take = covered.clone();
+        things.iter().flat_map(|t: &Thing| &t.cells).for_each(|&i| take[i] = false);
+        for (i, cell) in cells.iter().enumerate().filter(|(_, c)| c.seen()) {
+            take[i] = take[i] && clear_of_rim(found, floor.vessel, cell);
+        }
+        surface = fit(grid, cells, &take).or(surface);
+    }
+    let kinds = kinds(grid, cells, &covered, &things);
+    Classified { kinds, surface, things }
+}
+
+/// Whether the content's rim stays out of a cell.
+fn clear_of_rim(surface: &Surface, vessel: &Vessel, cell: &Cell) -> bool {
+    let [x, y, _] = cell.mean;
+    let r = x.hypot(y).max(1e-9);
+    let [z, zx, zy] = surface.trend_at(x, y);
+    let fall = -vessel.cone_height() / vessel.radius / r;
+    let rise = (fall * x - zx).hypot(fall * y - zy);
+    vessel.floor(r) - z > CLEAR * surface.grid.cell() * rise
+}
+
+fn kinds(grid: &Grid, cells: &[Cell], covered: &[bool], things: &[Thing]) -> Vec<Kind> {
+    let mut kinds: Vec<Kind> = cells
+        .iter()
+        .enumerate()
+        .map(|(i, cell)| match (cell.seen(), covered[i]) {
+            (false, _) => Kind::Unseen,
+            (true, true) => Kind::Feed,
+            (true, false) if grid.around(i).any(|j| covered[j]) => Kind::Rim,
+            (true, false) => Kind::Bare,
+        })
+        .collect();
+    things.iter().flat_map(|t| &t.cells).for_each(|&i| kinds[i] = Kind::Clutter);
+    kinds
+}
+
+/// Labels of the parts into which steep steps divide the covered cells; 0 for cells that are not covered.
+fn parts(grid: &Grid, cells: &[Cell], covered: &[bool]) -> (Vec<usize>, Vec<usize>) {
+    let mut labels = vec![0; grid.len()];
+    let mut sizes = vec![0];
+    let mut stack = Vec::new();
+    for seed in 0..grid.len() {
+        if !covered[seed] || labels[seed] != 0 {
+            continue;
+        }
+        let label = sizes.len();
+        sizes.push(0);
+        labels[seed] = label;
+        stack.push(seed);
+        while let Some(i) = stack.pop() {
+            sizes[label] += 1;
+            for j in grid.around(i).filter(|&j| covered[j]) {
+                if labels[j] == 0 && joined(&cells[i], &cells[j]) {
+                    labels[j] = label;
+                    stack.push(j);
+                }
+            }
+        }
+    }
+    (labels, sizes)
+}
+
+/// Whether one could walk from one cell to the other.
+fn joined(a: &Cell, b: &Cell) -> bool {
+    let [dx, dy, dz] = [0, 1, 2].map(|k| a.mean[k] - b.mean[k]);
+    let noise = (a.noise / a.count + b.noise / b.count).sqrt();
+    dz.abs() <= STEEPEST * dx.hypot(dy) + 4.0 * noise
+}
+
+/// The largest part.
+fn main_part(grid: &Grid, cells: &[Cell], covered: &[bool]) -> Vec<bool> {
+    let (labels, sizes) = parts(grid, cells, covered);
+    let largest = (1..sizes.len()).max_by_key(|&label| sizes[label]);
+    labels.iter().map(|&label| Some(label) == largest).collect()
+}
+
+/// Parts that float above the surface.
+fn things(grid: &Grid, cells: &[Cell], covered: &[bool], main: &[bool], surface: &Surface, vessel: &Vessel) -> Vec<Thing> {
+    let (labels, sizes) = parts(grid, cells, covered);
+    let mut found: Vec<Thing> = vec![Thing { cells: Vec::new(), above: 0.0, at_wall: false }; sizes.len()];
+    for i in (0..grid.len()).filter(|&i| covered[i] && !main[i]) {
+        let [x, y, z] = cells[i].mean;
+        let thing = &mut found[labels[i]];
+        thing.cells.push(i);
+        thing.above += surface.trend_at(x, y)[0] - z;
+        thing.at_wall |= vessel.radius - x.hypot(y) < 2.0 * grid.cell();
+    }
+    found.iter_mut().for_each(|t| t.above /= t.cells.len().max(1) as f64);
+    let least = (3.0 * surface.roughness).max(STEEPEST * grid.cell());
+    found.retain(|t| !t.cells.is_empty() && t.above > least);
+    found.sort_by_key(|t| std::cmp::Reverse(t.cells.len()));
+    found
+}

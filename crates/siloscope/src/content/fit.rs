@@ -1,0 +1,232 @@
+//! The surface through the cells: trend, then the detail that the trend is too smooth for.
+
+use super::basis::{Basis, Roughness, Row};
+use super::cells::Cell;
+use super::detail;
+use super::grid::Grid;
+use super::trend::{Observation, Sums, Trend};
+
+/// A residual beyond so many robust standard deviations counts less, the more so the farther it is.
+const HUBER: f64 = 2.5;
+/// Rounds of reweighting.
+const ROUNDS: usize = 3;
+/// Roughness of the first, loose fit.
+const LOOSE: Roughness = Roughness { bend: 1.0, rest: 0.1 };
+/// Values tried for the roughness, from which the evidence chooses.
+const BENDS: [f64; 4] = [0.1, 0.2, 0.5, 1.2];
+const RESTS: [f64; 5] = [0.005, 0.012, 0.03, 0.07, 0.16];
+/// Smallest standard deviation of a cell's height, metres: what rounding and a cell's own curvature leave.
+const SMALLEST: f64 = 5e-4;
+/// Fewest cells that make a surface.
+const FEWEST: usize = 3;
+
+/// The surface of the content in the silo frame: z as a function of x and y.
+#[derive(Debug, Clone)]
+pub struct Surface {
+    /// The cells.
+    pub grid: Grid,
+    /// The trend's functions.
+    pub basis: Basis,
+    /// The trend, in units of the grid's reach.
+    pub trend: Trend,
+    /// z of the trend's zero.
+    pub datum: f64,
+    /// What the cells add to the trend, metres down; 0 for each where the trend explains them.
+    pub detail: Vec<f64>,
+    /// Standard deviation of the detail, metres.
+    pub roughness: f64,
+    /// Cells over which a deviation from the trend keeps its sign, as an area in cells.
+    pub patch: f64,
+    /// Share of each cell's deviation that is the surface's and not the sensor's noise.
+    pub kept: Vec<f64>,
+    /// The observations that the trend was made of, with their cells.
+    pub used: Vec<(usize, Observation)>,
+}
+
+impl Surface {
+    /// The basis at a place.
+    pub fn row(&self, x: f64, y: f64) -> Row {
+        self.basis.row(self.unit([x, y]))
+    }
+
+    /// z of the surface and its slopes at a place, by the trend alone.
+    pub fn trend_at(&self, x: f64, y: f64) -> [f64; 3] {
+        let [z, zx, zy] = self.trend.jet(&self.row(x, y));
+        [self.datum + z * self.grid.reach, zx, zy]
+    }
+
+    /// z of the surface at a place.
+    pub fn height(&self, x: f64, y: f64) -> f64 {
+        self.trend_at(x, y)[0] + detail::between(&self.grid, &self.detail, x, y)
+    }
+
+    /// Share of a cell's deviation from the trend that is taken for the surface's own.
+    pub fn kept(&self, cell: usize) -> f64 {
+        self.kept.get(cell).copied().unwrap_or(0.0)
+    }
+
+    fn unit(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [cx, cy] = self.grid.centre;
+        [(x - cx) / self.grid.reach, (y - cy) / self.grid.reach]
+    }
+}
+
+/// Fits the surface to the cells that `take` names; None where they are too few.
+pub fn fit(grid: &Grid, cells: &[Cell], take: &[bool]) -> Option<Surface> {
+    let (mut work, datum) = Work::new(grid, cells, take, [0.0, 0.0])?;
+    let loose = work.robust(LOOSE)?;
+    work.settle(&loose);
+    let (_, trend) = work.most_probable()?;
+    work.unbend(cells, &trend);
+    let patch = work.patch(&trend);
+    for o in &mut work.observations {
+        o.variance *= patch;
+    }
+    let (_, trend) = work.most_probable()?;
+    Some(work.finish(datum, trend, patch))
+}
+
+/// The observations on their way to a surface. Heights in units of the grid's reach.
+struct Work<'a> {
+    grid: &'a Grid,
+    basis: Basis,
+    cells: Vec<usize>,
+    observations: Vec<Observation>,
+    /// Variance of each cell's height by the sensor's noise alone.
+    noise: Vec<f64>,
+    /// Variance that the trend does not explain.
+    rough: f64,
+}
+
+impl<'a> Work<'a> {
+    fn new(grid: &'a Grid, cells: &[Cell], take: &[bool], centre: [f64; 2]) -> Option<(Self, f64)> {
+        let basis = Basis::new(centre);
+        let taken: Vec<usize> = (0..cells.len()).filter(|&i| take[i] && cells[i].seen()).collect();
+        if taken.len() < FEWEST {
+            return None;
+        }
+        let datum = taken.iter().map(|&i| cells[i].mean[2]).sum::<f64>() / taken.len() as f64;
+        let noise = |c: &Cell| (c.noise / c.count + SMALLEST * SMALLEST) / (grid.reach * grid.reach);
+        let observe = |&i: &usize| {
+            let [x, y, z] = cells[i].mean;
+            let place = [(x - grid.centre[0]) / grid.reach, (y - grid.centre[1]) / grid.reach];
+            Observation { row: basis.row(place), value: (z - datum) / grid.reach, variance: noise(&cells[i]) }
+        };
+        let observations: Vec<_> = taken.iter().map(observe).collect();
+        let noise = taken.iter().map(|&i| noise(&cells[i])).collect();
+        Some((Self { grid, basis, cells: taken, observations, noise, rough: 0.0 }, datum))
+    }
+
+    fn residuals(&self, trend: &Trend) -> Vec<f64> {
+        self.observations.iter().map(|o| o.value - trend.jet(&o.row)[0]).collect()
+    }
+
+    /// Reweighted least squares: cells off the surface lose their say.
+    fn robust(&mut self, roughness: Roughness) -> Option<Trend> {
+        let mut trend = Sums::new(self.basis.len(), &self.observations).solve(&self.basis, roughness)?;
+        for _ in 1..ROUNDS {
+            self.settle(&trend);
+            trend = Sums::new(self.basis.len(), &self.observations).solve(&self.basis, roughness)?;
+        }
+        Some(trend)
+    }
+
+    /// Variances from the residuals: noise, what the trend leaves, and more for cells that stand out.
+    fn settle(&mut self, trend: &Trend) {
+        let residuals = self.residuals(trend);
+        let scatter = scatter(&residuals).powi(2);
+        let explained = self.noise.iter().sum::<f64>() / self.noise.len() as f64;
+        self.rough = (scatter - explained).max(0.0);
+        for ((o, residual), noise) in self.observations.iter_mut().zip(residuals).zip(&self.noise) {
+            let plain = noise + self.rough;
+            let excess = residual.abs() / (HUBER * plain.sqrt());
+            o.variance = plain * excess.max(1.0).powi(2);
+        }
+    }
+
+    /// The trend of the roughness under which the cells are most probable, found by climbing.
+    fn most_probable(&self) -> Option<(Roughness, Trend)> {
+        let sums = Sums::new(self.basis.len(), &self.observations);
+        let at = |b: usize, r: usize| Roughness { bend: BENDS[b], rest: RESTS[r] };
+        let (mut b, mut r) = (1, 1);
+        let mut best = sums.solve(&self.basis, at(b, r))?;
+        loop {
+            let steps = [(b + 1, r), (b.wrapping_sub(1), r), (b, r + 1), (b, r.wrapping_sub(1))];
+            let inside = steps.into_iter().filter(|&(b, r)| b < BENDS.len() && r < RESTS.len());
+            let tried = inside.filter_map(|(b, r)| Some((sums.solve(&self.basis, at(b, r))?, b, r)));
+            match tried.max_by(|x, y| x.0.evidence.total_cmp(&y.0.evidence)) {
+                Some((trend, nb, nr)) if trend.evidence > best.evidence + 0.1 => (best, b, r) = (trend, nb, nr),
+                _ => return Some((at(b, r), best)),
+            }
+        }
+    }
+
+    /// Takes from each cell's mean height what the surface's own bend over the cell adds to it.
+    fn unbend(&mut self, cells: &[Cell], trend: &Trend) {
+        let reach = self.grid.reach;
+        for (o, &i) in self.observations.iter_mut().zip(&self.cells) {
+            let [x, y, _] = cells[i].mean;
+            let [u, v] = [(x - self.grid.centre[0]) / reach, (y - self.grid.centre[1]) / reach];
+            let [du, dv] = [cells[i].spread[0].sqrt() / reach, cells[i].spread[1].sqrt() / reach];
+            let at = |u: f64, v: f64| trend.jet(&self.basis.row([u, v]))[0];
+            let sides = at(u + du, v) + at(u - du, v) + at(u, v + dv) + at(u, v - dv);
+            o.value -= 0.5 * (sides - 4.0 * at(u, v));
+        }
+    }
+
+    /// Area in cells over which residuals keep together, from the correlation of neighbours.
+    fn patch(&self, trend: &Trend) -> f64 {
+        let residuals = self.residuals(trend);
+        let limit = HUBER * scatter(&residuals);
+        let mut at = vec![f64::NAN; self.grid.len()];
+        for (&i, r) in self.cells.iter().zip(&residuals) {
+            at[i] = r.clamp(-limit, limit);
+        }
+        let (mut product, mut square, mut pairs) = (0.0, 0.0, 0.0);
+        for &i in &self.cells {
+            for j in self.grid.beside(i).filter(|&j| j > i && at[j].is_finite()) {
+                product += at[i] * at[j];
+                square += 0.5 * (at[i] * at[i] + at[j] * at[j]);
+                pairs += 1.0;
+            }
+        }
+        if pairs < 8.0 || square <= 0.0 {
+            return 1.0;
+        }
+        let correlation = (product / square).clamp(0.0, 0.9);
+        ((1.0 + correlation) / (1.0 - correlation)).powi(2)
+    }
+
+    fn finish(self, datum: f64, trend: Trend, patch: f64) -> Surface {
+        let residuals = self.residuals(&trend);
+        let reach = self.grid.reach;
+        let mut known = vec![None; self.grid.len()];
+        let mut kept = vec![0.0; self.grid.len()];
+        for ((&i, residual), noise) in self.cells.iter().zip(&residuals).zip(&self.noise) {
+            kept[i] = self.rough / (self.rough + noise);
+            known[i] = Some(kept[i] * residual * reach);
+        }
+        let detail = if self.rough > 0.0 { detail::fill(self.grid, &known) } else { vec![0.0; self.grid.len()] };
+        Surface {
+            grid: *self.grid,
+            basis: self.basis,
+            trend,
+            datum,
+            detail,
+            roughness: self.rough.sqrt() * reach,
+            patch,
+            kept,
+            used: self.cells.into_iter().zip(self.observations).collect(),
+        }
+    }
+}
+
+/// Robust standard deviation about zero.
+fn scatter(residuals: &[f64]) -> f64 {
+    let mut size: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
+    let middle = size.len() / 2;
+    if size.is_empty() {
+        return 0.0;
+    }
+    1.4826 * *size.select_nth_unstable_by(middle, f64::total_cmp).1
+}

@@ -1,0 +1,156 @@
+//! From a frame and a silo to its content: the page to read first.
+
+use super::cells::{Bound, Tally, gather};
+use super::classify::{Classified, Floor, Thing, classify};
+use super::depth::DepthTable;
+use super::doubt::{Covariance, DEPTH, GEOMETRY, Lever, POSE, Parameters, deviation, share};
+use super::fit::Surface;
+use super::grid::Grid;
+use super::returns::{Returns, Source};
+use super::vessel::Vessel;
+use super::volume::{Kind, Volume, integrate};
+use super::{cells::Cell, detail};
+use crate::{Result, SiloPose};
+use nalgebra::DVector;
+
+/// What is known before the frame.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// Pose of the camera.
+    pub pose: SiloPose,
+    /// The silo.
+    pub vessel: Vessel,
+    /// How well pose, geometry and depth bias are known.
+    pub covariance: Covariance,
+    /// How uneven the wall is, metres (standard deviation).
+    pub wall_std: f64,
+}
+
+/// Standard deviations of the volume, cubic metres.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Doubts {
+    /// By the camera's pose.
+    pub pose: f64,
+    /// By the silo's geometry.
+    pub geometry: f64,
+    /// By the sensor's systematic depth error, of which a scale error is a part.
+    pub depth: f64,
+    /// By the sensor's noise.
+    pub noise: f64,
+    /// By what is not seen of the surface.
+    pub unseen: f64,
+    /// By the grid.
+    pub grid: f64,
+    /// All together, with the correlations of pose, geometry and depth.
+    pub total: f64,
+}
+
+/// The content of one frame.
+#[derive(Debug, Clone)]
+pub struct Content {
+    /// The cells.
+    pub grid: Grid,
+    /// What the returns over each cell say.
+    pub cells: Vec<Cell>,
+    /// What each cell shows.
+    pub kinds: Vec<Kind>,
+    /// The surface; None where hardly any cell shows content.
+    pub surface: Option<Surface>,
+    /// The volume under it.
+    pub volume: Option<Volume>,
+    /// How sure it is.
+    pub doubts: Doubts,
+    /// Derivatives of the volume by the calibration's parameters.
+    pub derivatives: Parameters,
+    /// Things above the surface.
+    pub things: Vec<Thing>,
+    /// Counts of the frame.
+    pub tally: Tally,
+}
+
+/// Measures the content.
+pub fn measure(source: Source<'_>, table: &DepthTable, setup: &Setup) -> Result<Content> {
+    setup.vessel.validate()?;
+    let returns = Returns::new(source, table, &setup.pose)?;
+    let grid = Grid::over_disc([0.0, 0.0], setup.vessel.radius, returns.len());
+    let (cells, tally) = gather(&returns, &bound(setup), &grid);
+    let lever = Lever::new(&setup.pose);
+    let floor =
+        Floor { vessel: &setup.vessel, lever: &lever, covariance: &setup.covariance, wall_std: setup.wall_std };
+    let Classified { kinds, surface, things } = classify(&grid, &cells, &floor);
+    let volume = surface.as_ref().map(|s| integrate(s, &setup.vessel, &kinds));
+    let (doubts, derivatives) = match (&surface, &volume) {
+        (Some(surface), Some(volume)) => doubts(surface, volume, &cells, &lever, &setup.covariance),
+        _ => (Doubts::default(), Parameters::zeros()),
+    };
+    Ok(Content { grid, cells, kinds, surface, volume, doubts, derivatives, things, tally })
+}
+
+/// The cylinder with the variance of a point's distance to it.
+fn bound(setup: &Setup) -> Bound {
+    let c = &setup.covariance;
+    let constant = c[(2, 2)].max(c[(3, 3)]) + c[(4, 4)] + setup.wall_std * setup.wall_std;
+    let by_depth = c[(0, 0)].max(c[(1, 1)]) + c[(8, 8)];
+    Bound { radius: setup.vessel.radius, variance: [constant, by_depth], top: setup.vessel.top }
+}
+
+/// How much the volume shrinks for each metre that a cell's height z is larger.
+fn influences(surface: &Surface, volume: &Volume) -> (Vec<f64>, DVector<f64>) {
+    let reach = surface.grid.reach;
+    let rough = (surface.roughness / reach).powi(2);
+    let mut known = vec![false; surface.grid.len()];
+    surface.used.iter().for_each(|(i, _)| known[*i] = true);
+    let own = if rough > 0.0 { detail::gather(&surface.grid, &known, &volume.cells) } else { vec![0.0; known.len()] };
+    let mut left = volume.functions.clone();
+    let mut kept = Vec::with_capacity(surface.used.len());
+    for (i, o) in &surface.used {
+        let weight = own[*i] * surface.kept(*i);
+        o.row.iter().for_each(|(j, jet)| left[j] -= weight * jet[0] * reach);
+        kept.push(weight);
+    }
+    let spread = surface.trend.spread(&left);
+    let through = |o: &super::trend::Observation| {
+        o.row.iter().map(|(j, jet)| spread[j] * jet[0]).sum::<f64>() / (o.variance * reach)
+    };
+    let all = surface.used.iter().zip(kept).map(|((_, o), weight)| weight + through(o)).collect();
+    (all, left)
+}
+
+fn doubts(
+    surface: &Surface,
+    volume: &Volume,
+    cells: &[Cell],
+    lever: &Lever,
+    covariance: &Covariance,
+) -> (Doubts, Parameters) {
+    let (influences, left) = influences(surface, volume);
+    let mut derivatives = Parameters::zeros();
+    let mut noise = 0.0;
+    for ((i, _), influence) in surface.used.iter().zip(influences) {
+        let cell = &cells[*i];
+        let [_, zx, zy] = surface.trend_at(cell.mean[0], cell.mean[1]);
+        derivatives -= influence * lever.heights(cell.mean, [zx, zy]);
+        noise += influence * influence * cell.noise / cell.count;
+    }
+    derivatives[4] += volume.geometry.radius;
+    derivatives[5] += volume.geometry.cylinder_bottom;
+    derivatives[6] += volume.geometry.apex;
+    let patch = surface.patch * surface.grid.cell().powi(2);
+    let hidden = (volume.area - volume.seen).max(0.0) * patch * surface.roughness.powi(2);
+    let unseen = (left.dot(&surface.trend.spread(&left)) - noise).max(0.0) + hidden;
+    let grid = GRID_ERROR * volume.area;
+    let known = deviation(&derivatives, covariance).powi(2);
+    let out = Doubts {
+        pose: share(&derivatives, covariance, POSE),
+        geometry: share(&derivatives, covariance, GEOMETRY),
+        depth: share(&derivatives, covariance, DEPTH),
+        noise: noise.sqrt(),
+        unseen: unseen.sqrt(),
+        grid,
+        total: (known + noise + unseen + grid * grid).sqrt(),
+    };
+    (out, derivatives)
+}
+
+/// Mean height error that the grid leaves, metres.
+const GRID_ERROR: f64 = 2e-4;

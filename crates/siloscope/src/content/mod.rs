@@ -1,0 +1,15 @@
+//! What is in the silo: the surface of the content and the volume under it.
+
+pub mod basis;
+pub mod cells;
+pub mod classify;
+pub mod depth;
+pub mod detail;
+pub mod doubt;
+pub mod fit;
+pub mod grid;
+pub mod measure;
+pub mod returns;
+pub mod trend;
+pub mod vessel;
+pub mod volume;
