@@ -34,7 +34,12 @@ pub struct Roughness {
     pub bend: f64,
     /// Standard deviation of the smooth rest, in radii.
     pub rest: f64,
+    /// Over which distance the rest changes: an index into `RANGES`.
+    pub range: usize,
 }
+
+/// Ranges of the smooth rest, in radii.
+pub const RANGES: [f64; 2] = [1.0, 0.45];
 
 /// The functions of a surface about one centre.
 #[derive(Debug, Clone, PartialEq)]
@@ -138,17 +143,18 @@ impl Basis {
         let lattice = lattice();
         let m = lattice.points.len();
         let scale = 1.0 / (roughness.rest * roughness.rest);
-        q.view_mut((n - m, n - m), (m, m)).copy_from(&(&lattice.precision * scale));
-        (q, log + lattice.log_determinant + m as f64 * scale.ln())
+        let (precision, determinant) = &lattice.precisions[roughness.range.min(RANGES.len() - 1)];
+        q.view_mut((n - m, n - m), (m, m)).copy_from(&(precision * scale));
+        (q, log + determinant + m as f64 * scale.ln())
     }
 }
 
-/// The lattice's points near the disc and the precision of a Matérn field of variance 1 on them.
+/// The lattice's points near the disc, and for each range the precision of a Matérn field of variance 1 on them with
+/// the logarithm of its determinant.
 struct Lattice {
     points: Vec<[f64; 2]>,
     places: [Option<usize>; SIDE * SIDE],
-    precision: DMatrix<f64>,
-    log_determinant: f64,
+    precisions: [(DMatrix<f64>, f64); RANGES.len()],
 }
 
 impl Lattice {
@@ -170,17 +176,17 @@ fn lattice() -> &'static Lattice {
                 points.push(point);
             }
         }
-        let (precision, log_determinant) = matern_precision(&points);
-        Lattice { points, places, precision, log_determinant }
+        let precisions = RANGES.map(|range| matern_precision(&points, range));
+        Lattice { points, places, precisions }
     })
 }
 
-/// Inverse of `k(d) = (1 + √3 d) exp(-√3 d)` between the points, and the logarithm of the inverse's determinant.
-fn matern_precision(points: &[[f64; 2]]) -> (DMatrix<f64>, f64) {
+/// Inverse of `k(d) = (1 + √3 d/range) exp(-√3 d/range)` between the points, and the logarithm of the inverse's determinant.
+fn matern_precision(points: &[[f64; 2]], range: f64) -> (DMatrix<f64>, f64) {
     let n = points.len();
     let covariance = DMatrix::from_fn(n, n, |i, j| {
         let (a, b) = (points[i], points[j]);
-        let d = 3f64.sqrt() * (a[0] - b[0]).hypot(a[1] - b[1]);
+        let d = 3f64.sqrt() / range * (a[0] - b[0]).hypot(a[1] - b[1]);
         (1.0 + d) * (-d).exp()
     });
     match covariance.cholesky() {
@@ -243,7 +249,7 @@ mod tests {
     #[test]
     fn the_precision_has_the_determinant_it_says() {
         let basis = Basis::new([0.0, 0.0]);
-        let (q, log) = basis.precision(Roughness { bend: 0.4, rest: 0.03 });
+        let (q, log) = basis.precision(Roughness { bend: 0.4, rest: 0.03, range: 1 });
         assert_eq!(q.nrows(), basis.len());
         let Some(factor) = q.cholesky() else { panic!("positive definite") };
         assert!((factor.ln_determinant() - log).abs() < 1e-6 * log.abs());

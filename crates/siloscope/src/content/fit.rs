@@ -1,20 +1,26 @@
 //! The surface through the cells: trend, then the detail that the trend is too smooth for.
 
-use super::basis::{Basis, Roughness, Row};
+use super::basis::{Basis, RANGES, Roughness, Row};
 use super::cells::Cell;
 use super::detail;
 use super::grid::Grid;
 use super::trend::{Observation, Sums, Trend};
+use nalgebra::{Matrix2, Vector2};
 
 /// A residual beyond so many robust standard deviations counts less, the more so the farther it is.
 const HUBER: f64 = 2.5;
 /// Rounds of reweighting.
 const ROUNDS: usize = 3;
 /// Roughness of the first, loose fit.
-const LOOSE: Roughness = Roughness { bend: 1.0, rest: 0.1 };
+const LOOSE: Roughness = Roughness { bend: 1.0, rest: 0.1, range: 0 };
 /// Values tried for the roughness, from which the evidence chooses.
-const BENDS: [f64; 4] = [0.1, 0.2, 0.5, 1.2];
-const RESTS: [f64; 5] = [0.005, 0.012, 0.03, 0.07, 0.16];
+const BENDS: [f64; 5] = [0.05, 0.1, 0.2, 0.5, 1.2];
+const RESTS: [f64; 6] = [0.002, 0.005, 0.012, 0.03, 0.07, 0.16];
+/// Roughness under which two centres are compared, and how much more probable the cells must be about the new one.
+const TRIED: Roughness = Roughness { bend: 0.5, rest: 0.012, range: 0 };
+const GAIN: f64 = 3.0;
+/// Standard deviation of a heap's centre about the axis before anything is seen, in radii.
+const OFF_AXIS: f64 = 0.5;
 /// Smallest standard deviation of a cell's height, metres: what rounding and a cell's own curvature leave.
 const SMALLEST: f64 = 5e-4;
 /// Fewest cells that make a surface.
@@ -46,7 +52,7 @@ pub struct Surface {
 impl Surface {
     /// The basis at a place.
     pub fn row(&self, x: f64, y: f64) -> Row {
-        self.basis.row(self.unit([x, y]))
+        self.basis.row(unit(&self.grid, [x, y, 0.0]))
     }
 
     /// z of the surface and its slopes at a place, by the trend alone.
@@ -64,25 +70,24 @@ impl Surface {
     pub fn kept(&self, cell: usize) -> f64 {
         self.kept.get(cell).copied().unwrap_or(0.0)
     }
+}
 
-    fn unit(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let [cx, cy] = self.grid.centre;
-        [(x - cx) / self.grid.reach, (y - cy) / self.grid.reach]
-    }
+/// A place in the trend's units.
+fn unit(grid: &Grid, [x, y, _]: [f64; 3]) -> [f64; 2] {
+    [(x - grid.centre[0]) / grid.reach, (y - grid.centre[1]) / grid.reach]
 }
 
 /// Fits the surface to the cells that `take` names; None where they are too few.
 pub fn fit(grid: &Grid, cells: &[Cell], take: &[bool]) -> Option<Surface> {
-    let (mut work, datum) = Work::new(grid, cells, take, [0.0, 0.0])?;
+    let (mut work, datum) = Work::new(grid, cells, take)?;
     let loose = work.robust(LOOSE)?;
     work.settle(&loose);
-    let (_, trend) = work.most_probable()?;
+    work.centre(cells, &loose);
+    let trend = work.most_probable()?;
     work.unbend(cells, &trend);
     let patch = work.patch(&trend);
-    for o in &mut work.observations {
-        o.variance *= patch;
-    }
-    let (_, trend) = work.most_probable()?;
+    work.widen(patch);
+    let trend = work.most_probable()?;
     Some(work.finish(datum, trend, patch))
 }
 
@@ -99,8 +104,8 @@ struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    fn new(grid: &'a Grid, cells: &[Cell], take: &[bool], centre: [f64; 2]) -> Option<(Self, f64)> {
-        let basis = Basis::new(centre);
+    fn new(grid: &'a Grid, cells: &[Cell], take: &[bool]) -> Option<(Self, f64)> {
+        let basis = Basis::new([0.0, 0.0]);
         let taken: Vec<usize> = (0..cells.len()).filter(|&i| take[i] && cells[i].seen()).collect();
         if taken.len() < FEWEST {
             return None;
@@ -108,9 +113,8 @@ impl<'a> Work<'a> {
         let datum = taken.iter().map(|&i| cells[i].mean[2]).sum::<f64>() / taken.len() as f64;
         let noise = |c: &Cell| (c.noise / c.count + SMALLEST * SMALLEST) / (grid.reach * grid.reach);
         let observe = |&i: &usize| {
-            let [x, y, z] = cells[i].mean;
-            let place = [(x - grid.centre[0]) / grid.reach, (y - grid.centre[1]) / grid.reach];
-            Observation { row: basis.row(place), value: (z - datum) / grid.reach, variance: noise(&cells[i]) }
+            let value = (cells[i].mean[2] - datum) / grid.reach;
+            Observation { row: basis.row(unit(grid, cells[i].mean)), value, variance: noise(&cells[i]) }
         };
         let observations: Vec<_> = taken.iter().map(observe).collect();
         let noise = taken.iter().map(|&i| noise(&cells[i])).collect();
@@ -144,19 +148,33 @@ impl<'a> Work<'a> {
         }
     }
 
+    /// Puts the profile's centre where the slopes meet, if the cells are then more probable than about the axis.
+    fn centre(&mut self, cells: &[Cell], loose: &Trend) {
+        let place = |i: &usize| unit(self.grid, cells[*i].mean);
+        let slopes = self.cells.iter().zip(&self.observations).map(|(i, o)| (place(i), loose.jet(&o.row)));
+        let Some(centre) = meeting_point(slopes) else { return };
+        let basis = Basis::new(centre);
+        let moved: Vec<Observation> = (self.cells.iter().zip(&self.observations))
+            .map(|(i, o)| Observation { row: basis.row(place(i)), ..*o })
+            .collect();
+        let evidence = |basis: &Basis, observations: &[Observation]| {
+            Sums::new(basis.len(), observations).solve(basis, TRIED).map_or(f64::NEG_INFINITY, |trend| trend.evidence)
+        };
+        if evidence(&basis, &moved) > evidence(&self.basis, &self.observations) + GAIN {
+            (self.basis, self.observations) = (basis, moved);
+        }
+    }
+
     /// The trend of the roughness under which the cells are most probable, found by climbing.
-    fn most_probable(&self) -> Option<(Roughness, Trend)> {
+    fn most_probable(&self) -> Option<Trend> {
         let sums = Sums::new(self.basis.len(), &self.observations);
-        let at = |b: usize, r: usize| Roughness { bend: BENDS[b], rest: RESTS[r] };
-        let (mut b, mut r) = (1, 1);
-        let mut best = sums.solve(&self.basis, at(b, r))?;
+        let mut at = Steps { bend: 2, rest: 2, range: 0 };
+        let mut best = sums.solve(&self.basis, at.roughness())?;
         loop {
-            let steps = [(b + 1, r), (b.wrapping_sub(1), r), (b, r + 1), (b, r.wrapping_sub(1))];
-            let inside = steps.into_iter().filter(|&(b, r)| b < BENDS.len() && r < RESTS.len());
-            let tried = inside.filter_map(|(b, r)| Some((sums.solve(&self.basis, at(b, r))?, b, r)));
+            let tried = at.around().filter_map(|next| Some((sums.solve(&self.basis, next.roughness())?, next)));
             match tried.max_by(|x, y| x.0.evidence.total_cmp(&y.0.evidence)) {
-                Some((trend, nb, nr)) if trend.evidence > best.evidence + 0.1 => (best, b, r) = (trend, nb, nr),
-                _ => return Some((at(b, r), best)),
+                Some((trend, next)) if trend.evidence > best.evidence + 0.1 => (best, at) = (trend, next),
+                _ => return Some(best),
             }
         }
     }
@@ -165,12 +183,18 @@ impl<'a> Work<'a> {
     fn unbend(&mut self, cells: &[Cell], trend: &Trend) {
         let reach = self.grid.reach;
         for (o, &i) in self.observations.iter_mut().zip(&self.cells) {
-            let [x, y, _] = cells[i].mean;
-            let [u, v] = [(x - self.grid.centre[0]) / reach, (y - self.grid.centre[1]) / reach];
+            let [u, v] = unit(self.grid, cells[i].mean);
             let [du, dv] = [cells[i].spread[0].sqrt() / reach, cells[i].spread[1].sqrt() / reach];
             let at = |u: f64, v: f64| trend.jet(&self.basis.row([u, v]))[0];
             let sides = at(u + du, v) + at(u - du, v) + at(u, v + dv) + at(u, v - dv);
             o.value -= 0.5 * (sides - 4.0 * at(u, v));
+        }
+    }
+
+    /// Deviations that keep together over a patch of cells count once, not once a cell.
+    fn widen(&mut self, patch: f64) {
+        for (o, noise) in self.observations.iter_mut().zip(&self.noise) {
+            o.variance *= (noise + patch * self.rough) / (noise + self.rough);
         }
     }
 
@@ -218,6 +242,50 @@ impl<'a> Work<'a> {
             kept,
             used: self.cells.into_iter().zip(self.observations).collect(),
         }
+    }
+}
+
+/// Where the lines of steepest slope meet: least squares over the lines' distances, steep places counting more.
+fn meeting_point(slopes: impl Iterator<Item = ([f64; 2], [f64; 3])>) -> Option<[f64; 2]> {
+    let (mut a, mut b) = (Matrix2::zeros(), Vector2::zeros());
+    let mut steepness = 0.0;
+    for (place, [_, zx, zy]) in slopes {
+        let across = Vector2::new(-zy, zx);
+        a += across * across.transpose();
+        b += across * across.dot(&Vector2::from(place));
+        steepness += across.norm_squared();
+    }
+    // a line is known to a tenth of a radius; the prior keeps the centre of a plane at the axis
+    a += Matrix2::identity() * (0.01 / (OFF_AXIS * OFF_AXIS) * steepness);
+    let centre: Vector2<f64> = a.lu().solve(&b)?;
+    (centre.norm() <= 1.0 && centre.norm() > 0.01).then_some(centre.into())
+}
+
+/// A place in the lists of values tried for the roughness.
+#[derive(Debug, Clone, Copy)]
+struct Steps {
+    bend: usize,
+    rest: usize,
+    range: usize,
+}
+
+impl Steps {
+    fn roughness(self) -> Roughness {
+        Roughness { bend: BENDS[self.bend], rest: RESTS[self.rest], range: self.range }
+    }
+
+    /// One step up or down in each list.
+    fn around(self) -> impl Iterator<Item = Self> {
+        let Self { bend, rest, range } = self;
+        let steps = [
+            Self { bend: bend + 1, ..self },
+            Self { bend: bend.wrapping_sub(1), ..self },
+            Self { rest: rest + 1, ..self },
+            Self { rest: rest.wrapping_sub(1), ..self },
+            Self { range: range + 1, ..self },
+            Self { range: range.wrapping_sub(1), ..self },
+        ];
+        steps.into_iter().filter(|s| s.bend < BENDS.len() && s.rest < RESTS.len() && s.range < RANGES.len())
     }
 }
 

@@ -92,7 +92,7 @@ pub fn variance(covariance: &DMatrix<f64>, row: &Row) -> f64 {
 mod tests {
     use super::*;
 
-    const ROUGHNESS: Roughness = Roughness { bend: 0.5, rest: 0.05 };
+    const ROUGHNESS: Roughness = Roughness { bend: 0.5, rest: 0.05, range: 0 };
 
     fn observe(basis: &Basis, places: &[[f64; 2]], height: impl Fn(f64, f64) -> f64) -> Vec<Observation> {
         let at = |&[u, v]: &[f64; 2]| Observation { row: basis.row([u, v]), value: height(u, v), variance: 1e-6 };
@@ -136,7 +136,7 @@ mod tests {
         let wavy = |u: f64, v: f64| 0.1 * (5.0 * u).sin() * (4.0 * v).cos();
         let evidence = |height: &dyn Fn(f64, f64) -> f64, rest: f64| {
             let sums = Sums::new(basis.len(), &observe(&basis, &disc(), height));
-            sums.solve(&basis, Roughness { bend: 0.3, rest }).map(|t| t.evidence).unwrap_or(f64::NAN)
+            sums.solve(&basis, Roughness { bend: 0.3, rest, range: 0 }).map(|t| t.evidence).unwrap_or(f64::NAN)
         };
         assert!(evidence(&wavy, 0.1) > evidence(&wavy, 0.003));
         assert!(evidence(&|u, v| 0.3 * u.hypot(v), 0.1) < evidence(&|u, v| 0.3 * u.hypot(v), 0.003));

@@ -154,8 +154,9 @@ impl Spoke<'_> {
     /// Where the surface meets the floor between a covered and a bare place, by the Illinois rule.
     fn meeting(&self, mut covered: (f64, f64), mut bare: (f64, f64)) -> f64 {
         let mut last = 0;
+        let mut r = covered.0;
         for _ in 0..30 {
-            let r = (covered.0 * bare.1 - bare.0 * covered.1) / (bare.1 - covered.1);
+            r = (covered.0 * bare.1 - bare.0 * covered.1) / (bare.1 - covered.1);
             let thickness = self.thickness(r);
             if thickness > 0.0 {
                 covered = (r, thickness);
@@ -170,7 +171,7 @@ impl Spoke<'_> {
                 break;
             }
         }
-        covered.0
+        r
     }
 
     fn piece(&self, from: f64, to: f64, sums: &mut Volume) {
