@@ -4,12 +4,12 @@ use crate::convert::{self, value_error};
 use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use siloscope::content::depth::DepthTable;
 use siloscope::content::doubt::Covariance;
 use siloscope::content::measure::{Content, Setup, measure};
-use siloscope::content::returns::Source;
+use siloscope::content::returns::{Rays, Source};
 use siloscope::content::vessel::Vessel;
 use siloscope::SiloPose;
+use siloscope::sensor::{DepthBias, NoiseLaw};
 
 fn vessel([radius, cylinder_bottom, apex, top, outlet_radius, outlet_length]: [f64; 6]) -> Vessel {
     Vessel { radius, cylinder_bottom, apex, top, outlet_radius, outlet_length }
@@ -31,24 +31,17 @@ fn measure_content<'py>(
     let camera = camera.map(convert::camera).transpose()?;
     let covariance = Covariance::from_iterator(covariance.as_array().iter().copied());
     let [r_x, r_y, t_x, t_y] = pose;
-    let setup = Setup { pose: SiloPose { r_x, r_y, t_x, t_y }, vessel: vessel(silo), covariance, wall_std };
+    let setup = Setup { pose: SiloPose { r_x, r_y, t_x, t_y }, vessel: vessel(silo), covariance, wall_std,
+        bias: DepthBias { offset: bias[0], scale: bias[1], quadratic: bias[2] },
+        noise: NoiseLaw { floor: 0.0, constant: noise[0], linear: noise[1], quadratic: noise[2], power_factor: 0.0, power: 1.0 } };
     let depth = depth.as_slice()?;
-    let content = py.detach(|| {
-        let [o, b, q] = bias;
-        let reach = 1.5 * (setup.vessel.apex + setup.vessel.radius);
-        let table = DepthTable::new(
-            reach,
-            |m| {
-                let linear = 1.0 + b;
-                let rest = m - o;
-                2.0 * rest / (linear + (linear * linear + 4.0 * q * rest).sqrt())
-            },
-            |d| noise[0] + d * (noise[1] + d * noise[2]),
-        );
-        match &camera {
-            Some(camera) => measure(Source::Depth(depth, camera), &table, &setup),
-            None => measure(Source::Points(depth.as_chunks::<3>().0), &table, &setup),
+    let content = py.detach(|| match &camera {
+        Some(c) => {
+            let columns: Vec<f32> = (0..c.width).map(|u| c.ray(u as f64, c.cy)[0] as f32).collect();
+            let rows: Vec<f32> = (0..c.height).map(|v| c.ray(c.cx, v as f64)[1] as f32).collect();
+            measure(Source::Depth(depth, Rays::Pinhole(&columns, &rows)), &setup)
         }
+        None => measure(Source::Points(depth.as_chunks::<3>().0), &setup),
     });
     report(py, &content.map_err(value_error)?)
 }

@@ -49,33 +49,23 @@ pub struct Basis {
     knots: usize,
 }
 
-/// The functions that are not zero at a place, with their derivatives along u and v.
+/// The functions that are not zero at a place, by increasing index.
 #[derive(Debug, Clone)]
 pub struct Row {
     len: usize,
-    index: [usize; ROW],
-    jet: [[f64; 3]; ROW],
+    index: [u16; ROW],
+    value: [f64; ROW],
 }
 
 impl Row {
-    fn push(&mut self, index: usize, jet: [f64; 3]) {
-        if let (Some(i), Some(j)) = (self.index.get_mut(self.len), self.jet.get_mut(self.len)) {
-            (*i, *j) = (index, jet);
-            self.len += 1;
-        }
+    /// Index and value of each function.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, f64)> {
+        self.index.iter().map(|&i| usize::from(i)).zip(self.value.iter().copied()).take(self.len)
     }
 
-    /// Index, value and derivatives of each function.
-    pub fn iter(&self) -> impl Iterator<Item = (usize, &[f64; 3])> {
-        self.index.iter().copied().zip(&self.jet).take(self.len)
-    }
-
-    /// Value and derivatives of a surface.
-    pub fn jet(&self, coefficients: &[f64]) -> [f64; 3] {
-        self.iter().fold([0.0; 3], |sum, (i, jet)| {
-            let c = coefficients.get(i).copied().unwrap_or(0.0);
-            [sum[0] + c * jet[0], sum[1] + c * jet[1], sum[2] + c * jet[2]]
-        })
+    /// Value of a surface.
+    pub fn dot(&self, coefficients: &[f64]) -> f64 {
+        self.iter().map(|(i, value)| value * coefficients.get(i).copied().unwrap_or(0.0)).sum()
     }
 }
 
@@ -93,36 +83,60 @@ impl Basis {
     }
 
     /// The functions at a place.
-    pub fn row(&self, [u, v]: [f64; 2]) -> Row {
-        let mut row = Row { len: 0, index: [0; ROW], jet: [[0.0; 3]; ROW] };
-        row.push(0, [1.0, 0.0, 0.0]);
-        row.push(1, [u, 1.0, 0.0]);
-        row.push(2, [v, 0.0, 1.0]);
-        self.profile([u - self.centre[0], v - self.centre[1]], &mut row);
-        self.rest([u, v], &mut row);
+    pub fn row(&self, place: [f64; 2]) -> Row {
+        let mut row = Row { len: 0, index: [0; ROW], value: [0.0; ROW] };
+        self.each(place, |index, [value, _, _]| {
+            if let (Some(i), Some(v)) = (row.index.get_mut(row.len), row.value.get_mut(row.len)) {
+                (*i, *v) = (index as u16, value);
+                row.len += 1;
+            }
+        });
         row
     }
 
-    fn profile(&self, [u, v]: [f64; 2], row: &mut Row) {
-        let rho = u.hypot(v);
+    /// Value of a surface at a place, and its derivatives along u and v.
+    pub fn jet(&self, place: [f64; 2], coefficients: &[f64]) -> [f64; 3] {
+        let mut sum = [0.0; 3];
+        self.each(place, |index, jet| {
+            let c = coefficients.get(index).copied().unwrap_or(0.0);
+            sum.iter_mut().zip(jet).for_each(|(sum, part)| *sum += c * part);
+        });
+        sum
+    }
+
+    /// Calls `see` with index, value and derivatives of each function that is not zero at a place.
+    #[inline]
+    fn each(&self, [u, v]: [f64; 2], mut see: impl FnMut(usize, [f64; 3])) {
+        see(0, [1.0, 0.0, 0.0]);
+        see(1, [u, 1.0, 0.0]);
+        see(2, [v, 0.0, 1.0]);
+        self.profile([u - self.centre[0], v - self.centre[1]], &mut see);
+        self.rest([u, v], &mut see);
+    }
+
+    #[inline]
+    fn profile(&self, [u, v]: [f64; 2], see: &mut impl FnMut(usize, [f64; 3])) {
+        let rho = (u * u + v * v).sqrt();
         let slope = if rho > 1e-12 { [u / rho, v / rho] } else { [0.0; 2] };
         for k in 0..=self.knots {
             let beyond = rho - k as f64 * KNOT;
             if beyond <= 0.0 && k > 0 {
                 break;
             }
-            row.push(FIRST - 1 + k, [beyond, slope[0], slope[1]]);
+            see(FIRST - 1 + k, [beyond, slope[0], slope[1]]);
         }
     }
 
-    fn rest(&self, [u, v]: [f64; 2], row: &mut Row) {
+    #[inline]
+    fn rest(&self, [u, v]: [f64; 2], see: &mut impl FnMut(usize, [f64; 3])) {
+        let lattice = lattice();
         let ((column, x), (line, y)) = (cell(u), cell(v));
         let (wx, sx, wy, sy) = (spline(x), spline_slope(x), spline(y), spline_slope(y));
         for j in 0..4 {
             for i in 0..4 {
-                if let Some(place) = lattice().place(column + i, line + j) {
+                if let Some(place) = lattice.place(column + i, line + j) {
                     let jet = [wx[i] * wy[j], sx[i] * wy[j] / PITCH, wx[i] * sy[j] / PITCH];
-                    row.push(FIRST + self.knots + place, jet);
+                    see(FIRST + self.knots + place, jet);
                 }
             }
         }
@@ -230,8 +244,9 @@ mod tests {
             let c: Vec<f64> = (0..basis.len()).map(|i| ((seed + 1) as f64 * (i as f64 + 0.7)).sin()).collect();
             let rho = (u - 0.21).hypot(v + 0.4);
             prop_assume!((rho / KNOT - (rho / KNOT).round()).abs() > 1e-3);
-            let at = |u, v| basis.row([u, v]).jet(&c)[0];
-            let [_, du, dv] = basis.row([u, v]).jet(&c);
+            let at = |u, v| basis.row([u, v]).dot(&c);
+            let [value, du, dv] = basis.jet([u, v], &c);
+            prop_assert!((value - at(u, v)).abs() < 1e-9);
             let h = 1e-6;
             prop_assert!((du - (at(u + h, v) - at(u - h, v)) / (2.0 * h)).abs() < 1e-5);
             prop_assert!((dv - (at(u, v + h) - at(u, v - h)) / (2.0 * h)).abs() < 1e-5);
@@ -240,7 +255,7 @@ mod tests {
         #[test]
         fn splines_add_up_to_one(u in -1.0f64..1.0, v in -1.0f64..1.0) {
             let basis = Basis::new([0.0, 0.0]);
-            let sum: f64 = basis.row([u, v]).iter().filter(|(i, _)| *i >= FIRST + basis.knots).map(|(_, jet)| jet[0]).sum();
+            let sum: f64 = basis.row([u, v]).iter().filter(|(i, _)| *i >= FIRST + basis.knots).map(|(_, b)| b).sum();
             prop_assume!(u.hypot(v) < 1.0);
             prop_assert!((sum - 1.0).abs() < 1e-6);
         }

@@ -1,55 +1,116 @@
 //! Returns gathered into cells: the wall taken away, each cell's surface told from dust by its median.
 
+use super::doubt::Lever;
 use super::grid::Grid;
-use super::returns::{Return, Returns};
+use super::returns::{Line, Returns};
+use crate::sensor::NoiseLaw;
 
 /// Returns within so many standard deviations of the wall belong to the wall.
 const WALL_SIGMAS: f64 = 4.0;
 /// Returns farther than so many robust standard deviations from their cell's median are clutter.
-const CLUTTER_SIGMAS: f64 = 4.0;
+const CLUTTER_SIGMAS: f32 = 4.0;
 /// Returns of which the medians are taken; more add time, not certainty.
-const SURVEYED: usize = 80_000;
+const SURVEYED: f64 = 20_000.0;
 /// Fewest surveyed returns that make a median.
 const FEWEST: usize = 3;
+/// Two floating returns in a row whose depths differ by less than this share show a thing, not dust.
+const COHERENT: f32 = 0.02;
 
 /// The cylinder that bounds the surface, and how well it is known.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Bound {
-    /// Radius of the cylinder.
-    pub radius: f64,
-    /// Variance of the horizontal distance to the wall: constant part, and part for each square metre of depth².
-    pub variance: [f64; 2],
-    /// z above which nothing is looked at.
-    pub top: f64,
+    radius: f32,
+    /// Squared radius within which no return can belong to the wall.
+    inside: f32,
+    top: f32,
+    camera: [f32; 2],
+    /// For each step of depth, `2 k σ_d` and `2 k R σ_R`.
+    margins: Vec<[f32; 2]>,
 }
 
-/// Where a return lies.
+/// Step of the margins' table, metres.
+const STEP: f32 = 0.02;
+
+/// On which side of the wall a return lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Place {
-    /// Over this cell.
-    Over(usize),
-    /// On the cylinder's wall.
+enum Side {
+    Inside,
     Wall,
-    /// Outside the silo.
     Outside,
 }
 
-impl Bound {
-    /// Tells a return on the wall from one inside; |Δr| ≤ k σ is tested as |r² − R²| ≤ k (2 |p·ray| σ_d + 2 R σ_R).
-    #[inline]
-    pub fn place(&self, r: &Return, grid: &Grid) -> Place {
-        let [x, y, z] = r.point;
-        let lateral = (self.variance[0] + self.variance[1] * r.depth * r.depth).sqrt();
-        let along = (x * r.ray[0] + y * r.ray[1]).abs() * r.sigma + self.radius * lateral;
-        let margin = 2.0 * WALL_SIGMAS * along;
-        let excess = x * x + y * y - self.radius * self.radius;
-        if excess > margin || z < self.top {
-            Place::Outside
-        } else if excess > -margin {
-            Place::Wall
-        } else {
-            grid.index(x, y).map_or(Place::Outside, Place::Over)
+/// Cells and squared distances from the axis of one line's returns.
+#[derive(Debug, Default)]
+struct Places {
+    cell: Vec<u32>,
+    square: Vec<f32>,
+}
+
+impl Places {
+    fn work_out(&mut self, line: &Line, grid: &Grid) {
+        self.cell.resize(line.len(), 0);
+        self.square.resize(line.len(), 0.0);
+        let scale = 1.0 / grid.cell() as f32;
+        let [ox, oy] = grid.centre.map(|c| (grid.reach - c) as f32 * scale);
+        let (side, last) = (grid.side as i32, (grid.side - 1) as f32);
+        let out = self.cell.iter_mut().zip(&mut self.square);
+        for ((cell, square), (&x, &y)) in out.zip(line.x.iter().zip(&line.y)) {
+            let column = (x * scale + ox).clamp(0.0, last) as i32;
+            let row = (y * scale + oy).clamp(0.0, last) as i32;
+            *cell = (row * side + column) as u32;
+            *square = x * x + y * y;
         }
+    }
+}
+
+impl Bound {
+    /// A cylinder whose distance from a point is known to `variance[0] + variance[1] depth²`.
+    ///
+    /// `reach` is the largest depth of interest; nothing above `top` is looked at; `camera` is where it hangs.
+    pub fn new(radius: f64, variance: [f64; 2], noise: &NoiseLaw, reach: f64, top: f64, camera: [f64; 2]) -> Self {
+        let steps = (reach.clamp(0.0, 1e3) / f64::from(STEP)) as usize + 2;
+        let margin = |i: usize| {
+            let d = i as f64 * f64::from(STEP);
+            let lateral = (variance[0] + variance[1] * d * d).sqrt();
+            [(2.0 * WALL_SIGMAS * noise.sigma(d)) as f32, (2.0 * WALL_SIGMAS * radius * lateral) as f32]
+        };
+        let margins: Vec<[f32; 2]> = (0..steps).map(margin).collect();
+        let widest = margins.iter().fold(0.0f64, |most, m| most.max(f64::from(m[0]) * radius * 2.0 + f64::from(m[1])));
+        Self {
+            radius: radius as f32,
+            inside: (radius * radius - widest).max(0.0) as f32,
+            top: top as f32,
+            camera: camera.map(|c| c as f32),
+            margins,
+        }
+    }
+
+    /// Whether a return is so far inside that nothing else needs to be looked at.
+    #[inline]
+    fn surely_inside(&self, square: f32, z: f32) -> bool {
+        square < self.inside && z >= self.top
+    }
+
+    /// Tells a return on the wall from one inside; |Δr| ≤ k σ is tested as |r² − R²| ≤ 2 k (|p·ray| σ_d + R σ_R).
+    fn side(&self, [x, y, z]: [f32; 3], depth: f32) -> Side {
+        let [by_depth, by_radius] = self.margin(depth);
+        let along = (x * (x - self.camera[0]) + y * (y - self.camera[1])).abs() / depth;
+        let margin = by_depth * along + by_radius;
+        let excess = x * x + y * y - self.radius * self.radius;
+        if z < self.top || !(excess <= margin) {
+            Side::Outside
+        } else if excess > -margin {
+            Side::Wall
+        } else {
+            Side::Inside
+        }
+    }
+
+    #[inline]
+    fn margin(&self, depth: f32) -> [f32; 2] {
+        let last = self.margins.len().saturating_sub(1);
+        let i = ((depth * (1.0 / STEP)) as usize).min(last);
+        self.margins.get(i).copied().unwrap_or([0.0; 2])
     }
 }
 
@@ -60,24 +121,33 @@ pub struct Cell {
     pub count: f64,
     /// Their mean point in the silo frame.
     pub mean: [f64; 3],
-    /// Their mean distance from the axis.
-    pub radius: f64,
-    /// Their mean depth.
-    pub depth: f64,
-    /// Variance of their heights, and of their places along x and y.
-    pub spread: [f64; 3],
-    /// Variance of one return's height by the sensor's noise.
-    pub noise: f64,
+    /// Variance of their mean height by the sensor's noise.
+    pub variance: f64,
     /// Returns above what agrees.
     pub above: f64,
     /// Returns below what agrees.
     pub below: f64,
 }
 
+impl Cell {
+    /// Whether anything agrees in it.
+    pub fn seen(&self) -> bool {
+        self.count > 0.0
+    }
+
+    fn finish(&mut self, noise: &NoiseLaw, lever: &Lever) {
+        if self.count > 0.0 {
+            self.mean = self.mean.map(|sum| sum / self.count);
+            let depth = lever.depth(self.mean);
+            self.variance = (noise.sigma(depth) * self.mean[2] / depth).powi(2) / self.count;
+        }
+    }
+}
+
 /// Counts of the whole frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Tally {
-    /// Returns inside the profile's range.
+    /// Pixels or points with a measurement.
     pub returns: f64,
     /// Returns on the cylinder's wall.
     pub wall: f64,
@@ -92,136 +162,175 @@ pub struct Tally {
 /// Heights that agree with a cell's median.
 #[derive(Debug, Clone, Copy)]
 struct Window {
-    low: f64,
-    high: f64,
+    low: f32,
+    high: f32,
 }
 
 /// Nothing agrees with it.
-const CLOSED: Window = Window { low: f64::INFINITY, high: f64::NEG_INFINITY };
+const CLOSED: Window = Window { low: f32::INFINITY, high: f32::NEG_INFINITY };
 
 /// Gathers a frame into cells.
-pub fn gather(returns: &Returns<'_>, bound: &Bound, grid: &Grid) -> (Vec<Cell>, Tally) {
-    let windows = survey(returns, bound, grid);
-    let mut cells = vec![Cell::default(); grid.len()];
-    let mut tally = Tally::default();
-    let mut floating = f64::NEG_INFINITY;
-    returns.visit(1, |r| {
-        tally.returns += 1.0;
-        match bound.place(&r, grid) {
-            Place::Wall => tally.wall += 1.0,
-            Place::Outside => tally.outside += 1.0,
-            Place::Over(index) => {
-                let (Some(cell), Some(window)) = (cells.get_mut(index), windows.get(index)) else { return };
-                if r.point[2] < window.low {
-                    cell.above += 1.0;
-                    tally.above += 1.0;
-                    tally.coherent += f64::from(u8::from((r.depth - floating).abs() < 0.02 * r.depth + 4.0 * r.sigma));
-                    floating = r.depth;
-                } else if r.point[2] > window.high {
-                    cell.below += 1.0;
-                } else {
-                    cell.add(&r);
-                }
-            }
-        }
+pub fn gather(
+    returns: &Returns<'_>,
+    bound: &Bound,
+    grid: &Grid,
+    noise: &NoiseLaw,
+    lever: &Lever,
+) -> (Vec<Cell>, Tally) {
+    let mut sums = Gathering {
+        bound,
+        windows: survey(returns, bound, grid, noise),
+        cells: vec![Cell::default(); grid.len()],
+        tally: Tally::default(),
+        run: Run::default(),
+        floating: f32::INFINITY,
+    };
+    let mut places = Places::default();
+    returns.visit(1, |line| {
+        places.work_out(line, grid);
+        sums.add(line, &places);
     });
-    cells.iter_mut().for_each(Cell::finish);
-    (cells, tally)
+    sums.flush();
+    sums.cells.iter_mut().for_each(|cell| cell.finish(noise, lever));
+    (sums.cells, sums.tally)
 }
 
-impl Cell {
-    /// Whether anything agrees in it.
-    pub fn seen(&self) -> bool {
-        self.count > 0.0
-    }
+/// Returns one after another over the same cell, not yet added to it: their sum of x, y, z and 1.
+///
+/// A run is some ten returns long, so single precision loses nothing.
+#[derive(Debug, Clone, Copy, Default)]
+struct Run {
+    cell: u32,
+    sum: [f32; 4],
+}
 
-    /// Adds to the sums that `finish` turns into means.
-    #[inline]
-    fn add(&mut self, r: &Return) {
-        self.count += 1.0;
-        for i in 0..3 {
-            self.mean[i] += r.point[i];
-            self.spread[i] += r.point[i] * r.point[i];
-        }
-        self.radius += (r.point[0] * r.point[0] + r.point[1] * r.point[1]).sqrt();
-        self.depth += r.depth;
-        let along = r.sigma * r.ray[2];
-        self.noise += along * along;
-    }
+/// Sums on their way.
+struct Gathering<'a> {
+    bound: &'a Bound,
+    windows: Vec<Window>,
+    cells: Vec<Cell>,
+    tally: Tally,
+    run: Run,
+    floating: f32,
+}
 
-    fn finish(&mut self) {
-        if self.count > 0.0 {
-            let n = self.count;
-            self.mean = self.mean.map(|sum| sum / n);
-            for (spread, mean) in self.spread.iter_mut().zip(self.mean) {
-                *spread = (*spread / n - mean * mean).max(0.0);
+impl Gathering<'_> {
+    fn add(&mut self, line: &Line, places: &Places) {
+        let points = line.x.iter().zip(&line.y).zip(&line.z).zip(&line.depth);
+        for ((((&x, &y), &z), &depth), (&cell, &square)) in points.zip(places.cell.iter().zip(&places.square)) {
+            if depth <= 0.0 {
+                continue;
             }
-            self.radius /= n;
-            self.depth /= n;
-            self.noise /= n;
+            if self.bound.surely_inside(square, z) {
+                self.over(cell, [x, y, z], depth);
+                continue;
+            }
+            match self.bound.side([x, y, z], depth) {
+                Side::Inside => self.over(cell, [x, y, z], depth),
+                Side::Wall => self.tally.wall += 1.0,
+                Side::Outside => self.tally.outside += 1.0,
+            }
+        }
+        self.tally.returns += line.depth.iter().filter(|&&d| d > 0.0).count() as f64;
+    }
+
+    #[inline]
+    fn over(&mut self, cell: u32, [x, y, z]: [f32; 3], depth: f32) {
+        let window = self.windows.get(cell as usize).copied().unwrap_or(CLOSED);
+        if z >= window.low && z <= window.high {
+            if cell != self.run.cell {
+                self.flush();
+                self.run.cell = cell;
+            }
+            self.run.sum.iter_mut().zip([x, y, z, 1.0]).for_each(|(sum, part)| *sum += part);
+        } else {
+            self.stray(cell, z < window.low, depth);
+        }
+    }
+
+    /// A return above or below the surface.
+    #[cold]
+    fn stray(&mut self, cell: u32, above: bool, depth: f32) {
+        let Some(cell) = self.cells.get_mut(cell as usize) else { return };
+        if !above {
+            cell.below += 1.0;
+            return;
+        }
+        cell.above += 1.0;
+        self.tally.above += 1.0;
+        self.tally.coherent += f64::from(u8::from((depth - self.floating).abs() < COHERENT * depth));
+        self.floating = depth;
+    }
+
+    fn flush(&mut self) {
+        let run = std::mem::take(&mut self.run);
+        let [x, y, z, count] = run.sum.map(f64::from);
+        if let Some(cell) = self.cells.get_mut(run.cell as usize) {
+            cell.count += count;
+            cell.mean = [cell.mean[0] + x, cell.mean[1] + y, cell.mean[2] + z];
         }
     }
 }
+
+/// A surveyed return: its cell, height and depth.
+type Sample = (u32, f32, f32);
 
 /// The window of each cell, from every so many returns.
-fn survey(returns: &Returns<'_>, bound: &Bound, grid: &Grid) -> Vec<Window> {
-    let stride = (returns.len() as f64 / SURVEYED as f64).sqrt().floor().max(1.0) as usize;
-    let mut found: Vec<(u32, f32, f32)> = Vec::with_capacity(returns.len() / (stride * stride) + 1);
-    returns.visit(stride, |r| {
-        if let Place::Over(cell) = bound.place(&r, grid) {
-            found.push((cell as u32, r.point[2] as f32, (r.sigma * r.ray[2]) as f32));
+fn survey(returns: &Returns<'_>, bound: &Bound, grid: &Grid, noise: &NoiseLaw) -> Vec<Window> {
+    let stride = (returns.len() as f64 / SURVEYED).sqrt().round().max(1.0) as usize;
+    let mut samples: Vec<Sample> = Vec::with_capacity(returns.len() / (stride * stride) + 1);
+    let mut places = Places::default();
+    returns.visit(stride, |line| {
+        places.work_out(line, grid);
+        for i in (0..line.len()).filter(|&i| line.depth[i] > 0.0) {
+            let (point, depth) = ([line.x[i], line.y[i], line.z[i]], line.depth[i]);
+            if bound.surely_inside(places.square[i], point[2]) || bound.side(point, depth) == Side::Inside {
+                samples.push((places.cell[i], point[2], depth));
+            }
         }
     });
-    let starts = starts(&found, grid.len());
-    let mut heights = vec![0f32; found.len()];
-    let mut noise = vec![0f64; grid.len()];
-    let mut next = starts.clone();
-    for &(cell, z, sigma) in &found {
-        let cell = cell as usize;
-        if let (Some(place), Some(sum)) = (next.get_mut(cell), noise.get_mut(cell)) {
-            if let Some(slot) = heights.get_mut(*place) {
-                *slot = z;
-            }
-            *place += 1;
-            *sum += f64::from(sigma);
+    samples.sort_unstable_by_key(|s| s.0);
+    let mut windows = vec![CLOSED; grid.len()];
+    for group in samples.chunk_by_mut(|a, b| a.0 == b.0) {
+        if let Some(window) = group.first().and_then(|s| windows.get_mut(s.0 as usize)) {
+            *window = self::window(group, noise);
         }
     }
-    let ends = starts.iter().skip(1);
-    let cells = starts.iter().zip(ends).zip(&noise);
-    cells.map(|((&from, &to), &sum)| heights.get_mut(from..to).map_or(CLOSED, |z| window(z, sum))).collect()
+    let sparse: Vec<(usize, Window)> = (samples.chunk_by(|a, b| a.0 == b.0))
+        .filter(|group| group.len() < FEWEST)
+        .filter_map(|group| group.first().map(|s| s.0 as usize))
+        .map(|cell| (cell, grid.around(cell).fold(CLOSED, |hull, near| hull.with(&windows[near]))))
+        .collect();
+    sparse.into_iter().for_each(|(cell, window)| windows[cell] = window);
+    windows
 }
 
-/// First place of each cell in the sorted heights, and the end.
-fn starts(found: &[(u32, f32, f32)], cells: usize) -> Vec<usize> {
-    let mut starts = vec![0usize; cells + 1];
-    for &(cell, ..) in found {
-        if let Some(count) = starts.get_mut(cell as usize + 1) {
-            *count += 1;
-        }
+impl Window {
+    /// The window over both.
+    fn with(self, other: &Self) -> Self {
+        Self { low: self.low.min(other.low), high: self.high.max(other.high) }
     }
-    let mut sum = 0;
-    for start in &mut starts {
-        sum += *start;
-        *start = sum;
-    }
-    starts
 }
 
 /// Median ± k robust standard deviations, at least those of the sensor's noise.
-fn window(heights: &mut [f32], sigmas: f64) -> Window {
-    if heights.len() < FEWEST {
+fn window(group: &mut [Sample], noise: &NoiseLaw) -> Window {
+    if group.len() < FEWEST {
         return CLOSED;
     }
-    let noise = sigmas / heights.len() as f64;
-    let median = median(heights);
-    heights.iter_mut().for_each(|z| *z = (*z - median).abs());
-    let scatter = 1.4826 * f64::from(self::median(heights));
-    let half = CLUTTER_SIGMAS * scatter.max(noise) + 1e-4;
-    Window { low: f64::from(median) - half, high: f64::from(median) + half }
+    let depth = median(group, |s| s.2);
+    let z = median(group, |s| s.1);
+    group.iter_mut().for_each(|s| s.1 = (s.1 - z).abs());
+    let scatter = 1.4826 * median(group, |s| s.1);
+    let own = noise.sigma(f64::from(depth)) as f32;
+    let half = CLUTTER_SIGMAS * scatter.max(own) + 1e-4;
+    Window { low: z - half, high: z + half }
 }
 
-/// Upper median; the slice must not be empty.
-fn median(values: &mut [f32]) -> f32 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f32::total_cmp).1
+/// Upper median; 0 for nothing.
+fn median(group: &mut [Sample], key: impl Fn(&Sample) -> f32) -> f32 {
+    if group.is_empty() {
+        return 0.0;
+    }
+    let middle = group.len() / 2;
+    key(group.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b))).1)
 }

@@ -2,15 +2,13 @@
 
 use super::cells::Cell;
 use super::doubt::{Covariance, Lever, deviation};
-use super::fit::{Surface, fit};
+use super::fit::{Surface, fit, sketch};
 use super::grid::Grid;
 use super::vessel::Vessel;
 use super::volume::Kind;
 
 /// A cell shows content where its mean lies so many standard deviations above the floor.
 const SIGMAS: f64 = 4.0;
-/// Rounds of fitting and of leaving out the cells through which the content's rim runs.
-const ROUNDS: usize = 2;
 /// A cell is clear of the rim where the content under its middle is thicker than this many cells times its rise.
 const CLEAR: f64 = 0.75;
 /// Steepest climb between neighbouring cells of one surface: tan 65°; feed at rest never lies so steep.
@@ -53,31 +51,36 @@ pub struct Floor<'a> {
 
 impl Floor<'_> {
     /// Whether a cell's mean lies surely above the floor.
-    fn covered(&self, cell: &Cell) -> bool {
-        let thickness = self.vessel.floor(cell.radius) - cell.mean[2];
+    fn covered(&self, cell: &Cell, grid: &Grid) -> bool {
+        let thickness = self.vessel.floor(mean_radius(cell.mean, grid.cell())) - cell.mean[2];
         let known = deviation(&self.lever.thickness(cell.mean, self.vessel), self.covariance);
-        let noise = cell.noise / cell.count + self.wall_std * self.wall_std;
+        let noise = cell.variance + self.wall_std * self.wall_std;
         thickness > SIGMAS * (known * known + noise).sqrt()
     }
 }
 
+/// Mean distance from the axis over a square cell: `√(r² + c s²)` with the square's variance s².
+///
+/// c = 1/2 is right far from the axis, and 0.878 for a square about the axis.
+fn mean_radius([x, y, _]: [f64; 3], cell: f64) -> f64 {
+    let (square, spread) = (x * x + y * y, cell * cell / 6.0);
+    (square + (0.5 + 0.378 / (1.0 + square / spread)) * spread).sqrt()
+}
+
 /// Sorts the cells and fits the surface.
 pub fn classify(grid: &Grid, cells: &[Cell], floor: &Floor<'_>) -> Classified {
-    let covered: Vec<bool> = cells.iter().map(|c| c.seen() && floor.covered(c)).collect();
-    let things_of = |surface: &Surface, main: &[bool]| things(grid, cells, &covered, main, surface, floor.vessel);
+    let covered: Vec<bool> = cells.iter().map(|c| c.seen() && floor.covered(c, grid)).collect();
     let main = main_part(grid, cells, &covered);
-    let mut take = main.clone();
-    let mut surface = fit(grid, cells, &take);
     let mut things = Vec::new();
-    for _ in 0..ROUNDS {
-        let Some(found) = &surface else { break };
-        things = things_of(found, &main);
-        take = covered.clone();
+    let mut surface = None;
+    if let Some(sketch) = sketch(grid, cells, &main) {
+        things = things_above(grid, cells, &covered, &main, &sketch, floor.vessel);
+        let mut take = covered.clone();
         things.iter().flat_map(|t: &Thing| &t.cells).for_each(|&i| take[i] = false);
-        for (i, cell) in cells.iter().enumerate().filter(|(_, c)| c.seen()) {
-            take[i] = take[i] && clear_of_rim(found, floor.vessel, cell);
+        for (take, cell) in take.iter_mut().zip(cells) {
+            *take = *take && clear_of_rim(&sketch, floor.vessel, cell);
         }
-        surface = fit(grid, cells, &take).or(surface);
+        surface = fit(&sketch, cells, &take).or(Some(sketch));
     }
     let kinds = kinds(grid, cells, &covered, &things);
     Classified { kinds, surface, things }
@@ -137,7 +140,7 @@ fn parts(grid: &Grid, cells: &[Cell], covered: &[bool]) -> (Vec<usize>, Vec<usiz
 /// Whether one could walk from one cell to the other.
 fn joined(a: &Cell, b: &Cell) -> bool {
     let [dx, dy, dz] = [0, 1, 2].map(|k| a.mean[k] - b.mean[k]);
-    let noise = (a.noise / a.count + b.noise / b.count).sqrt();
+    let noise = (a.variance + b.variance).sqrt();
     dz.abs() <= STEEPEST * dx.hypot(dy) + 4.0 * noise
 }
 
@@ -149,7 +152,7 @@ fn main_part(grid: &Grid, cells: &[Cell], covered: &[bool]) -> Vec<bool> {
 }
 
 /// Parts that float above the surface.
-fn things(grid: &Grid, cells: &[Cell], covered: &[bool], main: &[bool], surface: &Surface, vessel: &Vessel) -> Vec<Thing> {
+fn things_above(grid: &Grid, cells: &[Cell], covered: &[bool], main: &[bool], surface: &Surface, vessel: &Vessel) -> Vec<Thing> {
     let (labels, sizes) = parts(grid, cells, covered);
     let mut found: Vec<Thing> = vec![Thing { cells: Vec::new(), above: 0.0, at_wall: false }; sizes.len()];
     for i in (0..grid.len()).filter(|&i| covered[i] && !main[i]) {

@@ -44,6 +44,11 @@ impl Lever {
         }
     }
 
+    /// Depth in the camera frame of a point of the silo frame.
+    pub fn depth(&self, point: [f64; 3]) -> f64 {
+        self.rotation.column(2).dot(&(Vector3::from(point) - self.translation))
+    }
+
     /// Derivatives by the parameters of where a measured point comes to lie in the silo frame.
     pub fn shifts(&self, point: [f64; 3]) -> [[f64; 3]; PARAMETERS] {
         let p_camera = self.rotation.transpose() * (Vector3::from(point) - self.translation);

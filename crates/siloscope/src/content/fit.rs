@@ -57,8 +57,15 @@ impl Surface {
 
     /// z of the surface and its slopes at a place, by the trend alone.
     pub fn trend_at(&self, x: f64, y: f64) -> [f64; 3] {
-        let [z, zx, zy] = self.trend.jet(&self.row(x, y));
+        let [z, zx, zy] = self.trend.jet(&self.basis, unit(&self.grid, [x, y, 0.0]));
         [self.datum + z * self.grid.reach, zx, zy]
+    }
+
+    /// Heights of the trend at the cells' mean points, in its units about the mean of those cells.
+    fn heights(&self, taken: &[usize], cells: &[Cell]) -> Vec<f64> {
+        let mean = taken.iter().map(|&i| cells[i].mean[2]).sum::<f64>() / taken.len().max(1) as f64;
+        let at = |&i: &usize| (self.trend_at(cells[i].mean[0], cells[i].mean[1])[0] - mean) / self.grid.reach;
+        taken.iter().map(at).collect()
     }
 
     /// z of the surface at a place.
@@ -77,24 +84,31 @@ fn unit(grid: &Grid, [x, y, _]: [f64; 3]) -> [f64; 2] {
     [(x - grid.centre[0]) / grid.reach, (y - grid.centre[1]) / grid.reach]
 }
 
-/// Fits the surface to the cells that `take` names; None where they are too few.
-pub fn fit(grid: &Grid, cells: &[Cell], take: &[bool]) -> Option<Surface> {
-    let (mut work, datum) = Work::new(grid, cells, take)?;
-    let loose = work.robust(LOOSE)?;
-    work.settle(&loose);
-    work.centre(cells, &loose);
-    let trend = work.most_probable()?;
+/// A first surface: a loose fit, to tell what lies on it.
+pub fn sketch(grid: &Grid, cells: &[Cell], take: &[bool]) -> Option<Surface> {
+    let mut work = Work::new(grid, cells, take)?;
+    let trend = work.robust(LOOSE)?;
+    Some(work.finish(trend, 1.0))
+}
+
+/// Fits the surface to the cells that `take` names, given a first one; None where they are too few.
+pub fn fit(sketch: &Surface, cells: &[Cell], take: &[bool]) -> Option<Surface> {
+    let mut work = Work::new(&sketch.grid, cells, take)?;
+    work.settle(&sketch.heights(&work.cells, cells));
+    let sums = work.centre(cells, sketch);
+    let (roughness, trend) = most_probable(&sums, &work.basis)?;
     work.unbend(cells, &trend);
     let patch = work.patch(&trend);
     work.widen(patch);
-    let trend = work.most_probable()?;
-    Some(work.finish(datum, trend, patch))
+    let trend = Sums::new(work.basis.len(), &work.observations).solve(&work.basis, roughness)?;
+    Some(work.finish(trend, patch))
 }
 
 /// The observations on their way to a surface. Heights in units of the grid's reach.
 struct Work<'a> {
     grid: &'a Grid,
     basis: Basis,
+    datum: f64,
     cells: Vec<usize>,
     observations: Vec<Observation>,
     /// Variance of each cell's height by the sensor's noise alone.
@@ -104,40 +118,44 @@ struct Work<'a> {
 }
 
 impl<'a> Work<'a> {
-    fn new(grid: &'a Grid, cells: &[Cell], take: &[bool]) -> Option<(Self, f64)> {
+    fn new(grid: &'a Grid, cells: &[Cell], take: &[bool]) -> Option<Self> {
         let basis = Basis::new([0.0, 0.0]);
         let taken: Vec<usize> = (0..cells.len()).filter(|&i| take[i] && cells[i].seen()).collect();
         if taken.len() < FEWEST {
             return None;
         }
         let datum = taken.iter().map(|&i| cells[i].mean[2]).sum::<f64>() / taken.len() as f64;
-        let noise = |c: &Cell| (c.noise / c.count + SMALLEST * SMALLEST) / (grid.reach * grid.reach);
+        let noise = |c: &Cell| (c.variance + SMALLEST * SMALLEST) / (grid.reach * grid.reach);
         let observe = |&i: &usize| {
             let value = (cells[i].mean[2] - datum) / grid.reach;
             Observation { row: basis.row(unit(grid, cells[i].mean)), value, variance: noise(&cells[i]) }
         };
         let observations: Vec<_> = taken.iter().map(observe).collect();
         let noise = taken.iter().map(|&i| noise(&cells[i])).collect();
-        Some((Self { grid, basis, cells: taken, observations, noise, rough: 0.0 }, datum))
+        Some(Self { grid, basis, datum, cells: taken, observations, noise, rough: 0.0 })
     }
 
-    fn residuals(&self, trend: &Trend) -> Vec<f64> {
-        self.observations.iter().map(|o| o.value - trend.jet(&o.row)[0]).collect()
+    fn fitted(&self, trend: &Trend) -> Vec<f64> {
+        self.observations.iter().map(|o| trend.height(&o.row)).collect()
+    }
+
+    fn residuals(&self, fitted: &[f64]) -> Vec<f64> {
+        self.observations.iter().zip(fitted).map(|(o, z)| o.value - z).collect()
     }
 
     /// Reweighted least squares: cells off the surface lose their say.
     fn robust(&mut self, roughness: Roughness) -> Option<Trend> {
         let mut trend = Sums::new(self.basis.len(), &self.observations).solve(&self.basis, roughness)?;
         for _ in 1..ROUNDS {
-            self.settle(&trend);
+            self.settle(&self.fitted(&trend));
             trend = Sums::new(self.basis.len(), &self.observations).solve(&self.basis, roughness)?;
         }
         Some(trend)
     }
 
     /// Variances from the residuals: noise, what the trend leaves, and more for cells that stand out.
-    fn settle(&mut self, trend: &Trend) {
-        let residuals = self.residuals(trend);
+    fn settle(&mut self, fitted: &[f64]) {
+        let residuals = self.residuals(fitted);
         let scatter = scatter(&residuals).powi(2);
         let explained = self.noise.iter().sum::<f64>() / self.noise.len() as f64;
         self.rough = (scatter - explained).max(0.0);
@@ -149,44 +167,32 @@ impl<'a> Work<'a> {
     }
 
     /// Puts the profile's centre where the slopes meet, if the cells are then more probable than about the axis.
-    fn centre(&mut self, cells: &[Cell], loose: &Trend) {
+    fn centre(&mut self, cells: &[Cell], sketch: &Surface) -> Sums {
+        let sums = |basis: &Basis, observations: &[Observation]| Sums::new(basis.len(), observations);
+        let about_axis = sums(&self.basis, &self.observations);
         let place = |i: &usize| unit(self.grid, cells[*i].mean);
-        let slopes = self.cells.iter().zip(&self.observations).map(|(i, o)| (place(i), loose.jet(&o.row)));
-        let Some(centre) = meeting_point(slopes) else { return };
+        let slopes = self.cells.iter().map(|i| (place(i), sketch.trend.jet(&sketch.basis, place(i))));
+        let Some(centre) = meeting_point(slopes) else { return about_axis };
         let basis = Basis::new(centre);
         let moved: Vec<Observation> = (self.cells.iter().zip(&self.observations))
             .map(|(i, o)| Observation { row: basis.row(place(i)), ..*o })
             .collect();
-        let evidence = |basis: &Basis, observations: &[Observation]| {
-            Sums::new(basis.len(), observations).solve(basis, TRIED).map_or(f64::NEG_INFINITY, |trend| trend.evidence)
-        };
-        if evidence(&basis, &moved) > evidence(&self.basis, &self.observations) + GAIN {
-            (self.basis, self.observations) = (basis, moved);
+        let about_centre = sums(&basis, &moved);
+        let evidence = |sums: &Sums, basis: &Basis| sums.solve(basis, TRIED).map_or(f64::NEG_INFINITY, |t| t.evidence);
+        if evidence(&about_centre, &basis) <= evidence(&about_axis, &self.basis) + GAIN {
+            return about_axis;
         }
-    }
-
-    /// The trend of the roughness under which the cells are most probable, found by climbing.
-    fn most_probable(&self) -> Option<Trend> {
-        let sums = Sums::new(self.basis.len(), &self.observations);
-        let mut at = Steps { bend: 2, rest: 2, range: 0 };
-        let mut best = sums.solve(&self.basis, at.roughness())?;
-        loop {
-            let tried = at.around().filter_map(|next| Some((sums.solve(&self.basis, next.roughness())?, next)));
-            match tried.max_by(|x, y| x.0.evidence.total_cmp(&y.0.evidence)) {
-                Some((trend, next)) if trend.evidence > best.evidence + 0.1 => (best, at) = (trend, next),
-                _ => return Some(best),
-            }
-        }
+        (self.basis, self.observations) = (basis, moved);
+        about_centre
     }
 
     /// Takes from each cell's mean height what the surface's own bend over the cell adds to it.
     fn unbend(&mut self, cells: &[Cell], trend: &Trend) {
-        let reach = self.grid.reach;
+        let half = 1.0 / (3f64.sqrt() * self.grid.side as f64); // standard deviation of a cell's places, in radii
         for (o, &i) in self.observations.iter_mut().zip(&self.cells) {
             let [u, v] = unit(self.grid, cells[i].mean);
-            let [du, dv] = [cells[i].spread[0].sqrt() / reach, cells[i].spread[1].sqrt() / reach];
-            let at = |u: f64, v: f64| trend.jet(&self.basis.row([u, v]))[0];
-            let sides = at(u + du, v) + at(u - du, v) + at(u, v + dv) + at(u, v - dv);
+            let at = |u: f64, v: f64| trend.height(&self.basis.row([u, v]));
+            let sides = at(u + half, v) + at(u - half, v) + at(u, v + half) + at(u, v - half);
             o.value -= 0.5 * (sides - 4.0 * at(u, v));
         }
     }
@@ -200,7 +206,7 @@ impl<'a> Work<'a> {
 
     /// Area in cells over which residuals keep together, from the correlation of neighbours.
     fn patch(&self, trend: &Trend) -> f64 {
-        let residuals = self.residuals(trend);
+        let residuals = self.residuals(&self.fitted(trend));
         let limit = HUBER * scatter(&residuals);
         let mut at = vec![f64::NAN; self.grid.len()];
         for (&i, r) in self.cells.iter().zip(&residuals) {
@@ -221,8 +227,8 @@ impl<'a> Work<'a> {
         ((1.0 + correlation) / (1.0 - correlation)).powi(2)
     }
 
-    fn finish(self, datum: f64, trend: Trend, patch: f64) -> Surface {
-        let residuals = self.residuals(&trend);
+    fn finish(self, trend: Trend, patch: f64) -> Surface {
+        let residuals = self.residuals(&self.fitted(&trend));
         let reach = self.grid.reach;
         let mut known = vec![None; self.grid.len()];
         let mut kept = vec![0.0; self.grid.len()];
@@ -235,12 +241,25 @@ impl<'a> Work<'a> {
             grid: *self.grid,
             basis: self.basis,
             trend,
-            datum,
+            datum: self.datum,
             detail,
             roughness: self.rough.sqrt() * reach,
             patch,
             kept,
             used: self.cells.into_iter().zip(self.observations).collect(),
+        }
+    }
+}
+
+/// The trend of the roughness under which the cells are most probable, found by climbing.
+fn most_probable(sums: &Sums, basis: &Basis) -> Option<(Roughness, Trend)> {
+    let mut at = Steps { bend: 2, rest: 2, range: 0 };
+    let mut best = sums.solve(basis, at.roughness())?;
+    loop {
+        let tried = at.around().filter_map(|next| Some((sums.solve(basis, next.roughness())?, next)));
+        match tried.max_by(|x, y| x.0.evidence.total_cmp(&y.0.evidence)) {
+            Some((trend, next)) if trend.evidence > best.evidence + 0.1 => (best, at) = (trend, next),
+            _ => return Some((at.roughness(), best)),
         }
     }
 }

@@ -12,7 +12,7 @@ pub struct Grid {
 }
 
 /// Fewest and most cells along a side.
-const SIDES: (usize, usize) = (12, 40);
+const SIDES: (usize, usize) = (12, 36);
 /// Returns wanted in a cell.
 const WANTED: f64 = 40.0;
 

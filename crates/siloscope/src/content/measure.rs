@@ -2,7 +2,6 @@
 
 use super::cells::{Bound, Tally, gather};
 use super::classify::{Classified, Floor, Thing, classify};
-use super::depth::DepthTable;
 use super::doubt::{Covariance, DEPTH, GEOMETRY, Lever, POSE, Parameters, deviation, share};
 use super::fit::Surface;
 use super::grid::Grid;
@@ -10,6 +9,7 @@ use super::returns::{Returns, Source};
 use super::vessel::Vessel;
 use super::volume::{Kind, Volume, integrate};
 use super::{cells::Cell, detail};
+use crate::sensor::{DepthBias, NoiseLaw};
 use crate::{Result, SiloPose};
 use nalgebra::DVector;
 
@@ -24,6 +24,10 @@ pub struct Setup {
     pub covariance: Covariance,
     /// How uneven the wall is, metres (standard deviation).
     pub wall_std: f64,
+    /// The sensor's bias, as the calibration has it.
+    pub bias: DepthBias,
+    /// The sensor's noise.
+    pub noise: NoiseLaw,
 }
 
 /// Standard deviations of the volume, cubic metres.
@@ -69,12 +73,12 @@ pub struct Content {
 }
 
 /// Measures the content.
-pub fn measure(source: Source<'_>, table: &DepthTable, setup: &Setup) -> Result<Content> {
+pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
     setup.vessel.validate()?;
-    let returns = Returns::new(source, table, &setup.pose)?;
+    let returns = Returns::new(source, setup.bias, &setup.pose)?;
     let grid = Grid::over_disc([0.0, 0.0], setup.vessel.radius, returns.len());
-    let (cells, tally) = gather(&returns, &bound(setup), &grid);
     let lever = Lever::new(&setup.pose);
+    let (cells, tally) = gather(&returns, &bound(setup), &grid, &setup.noise, &lever);
     let floor =
         Floor { vessel: &setup.vessel, lever: &lever, covariance: &setup.covariance, wall_std: setup.wall_std };
     let Classified { kinds, surface, things } = classify(&grid, &cells, &floor);
@@ -91,7 +95,10 @@ fn bound(setup: &Setup) -> Bound {
     let c = &setup.covariance;
     let constant = c[(2, 2)].max(c[(3, 3)]) + c[(4, 4)] + setup.wall_std * setup.wall_std;
     let by_depth = c[(0, 0)].max(c[(1, 1)]) + c[(8, 8)];
-    Bound { radius: setup.vessel.radius, variance: [constant, by_depth], top: setup.vessel.top }
+    let vessel = &setup.vessel;
+    let reach = 2.0 * (vessel.apex.abs() + vessel.radius + vessel.outlet_length);
+    let camera = [setup.pose.t_x, setup.pose.t_y];
+    Bound::new(vessel.radius, [constant, by_depth], &setup.noise, reach, vessel.top, camera)
 }
 
 /// How much the volume shrinks for each metre that a cell's height z is larger.
@@ -105,12 +112,12 @@ fn influences(surface: &Surface, volume: &Volume) -> (Vec<f64>, DVector<f64>) {
     let mut kept = Vec::with_capacity(surface.used.len());
     for (i, o) in &surface.used {
         let weight = own[*i] * surface.kept(*i);
-        o.row.iter().for_each(|(j, jet)| left[j] -= weight * jet[0] * reach);
+        o.row.iter().for_each(|(j, value)| left[j] -= weight * value * reach);
         kept.push(weight);
     }
     let spread = surface.trend.spread(&left);
     let through = |o: &super::trend::Observation| {
-        o.row.iter().map(|(j, jet)| spread[j] * jet[0]).sum::<f64>() / (o.variance * reach)
+        o.row.iter().map(|(j, value)| spread[j] * value).sum::<f64>() / (o.variance * reach)
     };
     let all = surface.used.iter().zip(kept).map(|((_, o), weight)| weight + through(o)).collect();
     (all, left)
@@ -130,7 +137,7 @@ fn doubts(
         let cell = &cells[*i];
         let [_, zx, zy] = surface.trend_at(cell.mean[0], cell.mean[1]);
         derivatives -= influence * lever.heights(cell.mean, [zx, zy]);
-        noise += influence * influence * cell.noise / cell.count;
+        noise += influence * influence * cell.variance;
     }
     derivatives[4] += volume.geometry.radius;
     derivatives[5] += volume.geometry.cylinder_bottom;

@@ -3,7 +3,6 @@
 pub mod basis;
 pub mod cells;
 pub mod classify;
-pub mod depth;
 pub mod detail;
 pub mod doubt;
 pub mod fit;

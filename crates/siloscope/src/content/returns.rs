@@ -1,61 +1,88 @@
-//! The frame's returns as points in the silo frame.
+//! The frame's returns as points in the silo frame, a line of pixels at a time.
+//!
+//! Plain loops over short slices: the compiler makes vector code of them, and half of a frame's time is spent here.
 
-use super::depth::DepthTable;
-use crate::{Camera, Distortion, Error, Result, SiloPose};
+use crate::sensor::DepthBias;
+use crate::{Error, Result, SiloPose};
 
 /// What a frame is made of.
 #[derive(Debug, Clone, Copy)]
 pub enum Source<'a> {
-    /// A depth image in metres, row by row, with its camera.
-    Depth(&'a [f32], &'a Camera),
+    /// A depth image in metres, row by row, with the pixels' rays.
+    Depth(&'a [f32], Rays<'a>),
     /// Points in the camera frame, in metres.
     Points(&'a [[f32; 3]]),
 }
 
-/// A frame whose depths are corrected by the sensor's profile and moved into the silo frame.
+/// Rays `(x/z, y/z)` of a depth image's pixels.
+#[derive(Debug, Clone, Copy)]
+pub enum Rays<'a> {
+    /// An ideal pinhole: one number a column and one a row.
+    Pinhole(&'a [f32], &'a [f32]),
+    /// One ray a pixel, and the number of columns.
+    Each(&'a [[f64; 2]], usize),
+}
+
+/// A frame whose depths are corrected for the sensor's bias and moved into the silo frame.
 #[derive(Debug)]
 pub struct Returns<'a> {
     source: Source<'a>,
-    table: &'a DepthTable,
-    rays: Rays,
-    rotation: [[f64; 3]; 3],
-    translation: [f64; 2],
+    bias: DepthBias,
+    rotation: [[f32; 3]; 3],
+    translation: [f32; 2],
 }
 
-/// One return.
-#[derive(Debug, Clone, Copy)]
-pub struct Return {
-    /// Point in the silo frame.
-    pub point: [f64; 3],
-    /// The ray in the silo frame: how the point moves for each metre of depth.
-    pub ray: [f64; 3],
-    /// True depth.
-    pub depth: f64,
-    /// Standard deviation of the depth.
-    pub sigma: f64,
+/// Points of one line of pixels in the silo frame. A depth of 0 is no measurement.
+#[derive(Debug, Default)]
+pub struct Line {
+    /// x of each point.
+    pub x: Vec<f32>,
+    /// y of each point.
+    pub y: Vec<f32>,
+    /// z of each point.
+    pub z: Vec<f32>,
+    /// True depth of each point.
+    pub depth: Vec<f32>,
+    rays: [Vec<f32>; 2],
 }
 
-#[derive(Debug)]
-enum Rays {
-    /// An ideal pinhole: one number a column and one a row.
-    Grid(Vec<f64>, Vec<f64>),
-    /// One ray a pixel.
-    Each(Vec<[f64; 2]>),
-    /// Points carry their own.
-    Own,
+impl Line {
+    fn resize(&mut self, len: usize) {
+        let [a, b] = &mut self.rays;
+        for column in [&mut self.x, &mut self.y, &mut self.z, &mut self.depth, a, b] {
+            column.resize(len, 0.0);
+        }
+    }
+
+    /// Number of pixels.
+    pub fn len(&self) -> usize {
+        self.depth.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.depth.is_empty()
+    }
 }
+
+/// Points that are taken as one line.
+const CHUNK: usize = 640;
 
 impl<'a> Returns<'a> {
     /// Puts a frame into the silo frame by the camera's pose.
-    pub fn new(source: Source<'a>, table: &'a DepthTable, pose: &SiloPose) -> Result<Self> {
+    pub fn new(source: Source<'a>, bias: DepthBias, pose: &SiloPose) -> Result<Self> {
+        if let Source::Depth(depth, rays) = source {
+            let expected = match rays {
+                Rays::Pinhole(columns, rows) => columns.len() * rows.len(),
+                Rays::Each(rays, columns) => rays.len() - rays.len() % columns.max(1),
+            };
+            if depth.len() != expected {
+                return Err(Error::Shape { what: "depth", got: depth.len(), expected });
+            }
+        }
         let r = pose.rotation();
-        Ok(Self {
-            source,
-            table,
-            rays: rays(source)?,
-            rotation: [0, 1, 2].map(|row| [0, 1, 2].map(|column| r[(row, column)])),
-            translation: [pose.t_x, pose.t_y],
-        })
+        let rotation = [0, 1, 2].map(|row| [0, 1, 2].map(|column| r[(row, column)] as f32));
+        Ok(Self { source, bias, rotation, translation: [pose.t_x as f32, pose.t_y as f32] })
     }
 
     /// Number of pixels or points, measured or not.
@@ -66,57 +93,156 @@ impl<'a> Returns<'a> {
         }
     }
 
-    /// Calls `see` for every return of every `stride`-th pixel along both sides (or of every `stride²`-th point).
-    ///
-    /// The visits come row by row; `row` starts a new one.
-    #[inline]
-    pub fn visit(&self, stride: usize, mut see: impl FnMut(Return)) {
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Calls `see` for every `stride`-th line, with every `stride`-th pixel of it.
+    pub fn visit(&self, stride: usize, mut see: impl FnMut(&Line)) {
         let stride = stride.max(1);
-        match (self.source, &self.rays) {
-            (Source::Points(points), _) => {
-                for p in points.iter().step_by(stride * stride) {
-                    self.see([f64::from(p[0] / p[2]), f64::from(p[1] / p[2])], p[2], &mut see);
+        let mut line = Line::default();
+        let mut finish = |line: &mut Line| {
+            self.place(line);
+            see(line);
+        };
+        match self.source {
+            Source::Points(points) => {
+                for chunk in points.chunks(CHUNK).step_by(stride) {
+                    line.resize(chunk.len().div_ceil(stride));
+                    load_points(&mut line, chunk.iter().step_by(stride));
+                    finish(&mut line);
                 }
             }
-            (Source::Depth(depth, camera), Rays::Grid(xs, ys)) => {
-                for (row, &y) in depth.chunks_exact(camera.width).zip(ys).step_by(stride) {
-                    for (&d, &x) in row.iter().zip(xs).step_by(stride) {
-                        self.see([x, y], d, &mut see);
-                    }
+            Source::Depth(depth, Rays::Pinhole(columns, rows)) if !columns.is_empty() => {
+                for (row, &y) in depth.chunks_exact(columns.len()).zip(rows).step_by(stride) {
+                    line.resize(row.len().div_ceil(stride));
+                    copy(&mut line.depth, row, stride);
+                    copy(&mut line.rays[0], columns, stride);
+                    line.rays[1].fill(y);
+                    finish(&mut line);
                 }
             }
-            (Source::Depth(depth, camera), Rays::Each(rays)) => {
-                let rows = depth.chunks_exact(camera.width).zip(rays.chunks_exact(camera.width));
-                for (row, rays) in rows.step_by(stride) {
-                    for (&d, &ray) in row.iter().zip(rays).step_by(stride) {
-                        self.see(ray, d, &mut see);
-                    }
+            Source::Depth(depth, Rays::Each(rays, columns)) if columns > 0 => {
+                let lines = depth.chunks_exact(columns).zip(rays.chunks_exact(columns));
+                for (row, rays) in lines.step_by(stride) {
+                    line.resize(row.len().div_ceil(stride));
+                    copy(&mut line.depth, row, stride);
+                    load_rays(&mut line, rays.iter().step_by(stride));
+                    finish(&mut line);
                 }
             }
-            (Source::Depth(..), Rays::Own) => {}
+            Source::Depth(..) => {}
         }
     }
 
-    #[inline]
-    fn see(&self, [x, y]: [f64; 2], measured: f32, see: &mut impl FnMut(Return)) {
-        let Some((depth, sigma)) = self.table.look_up(measured) else { return };
-        let ray = self.rotation.map(|[a, b, c]| a * x + b * y + c);
+    /// From measured depths and rays to true depths and points.
+    fn place(&self, line: &mut Line) {
+        self.correct(&mut line.depth);
+        let [rx, ry] = &line.rays;
         let [tx, ty] = self.translation;
-        see(Return { point: [depth * ray[0] + tx, depth * ray[1] + ty, depth * ray[2]], ray, depth, sigma });
+        for (out, (row, shift)) in
+            [&mut line.x, &mut line.y, &mut line.z].into_iter().zip(self.rotation.iter().zip([tx, ty, 0.0]))
+        {
+            let [a, b, c] = *row;
+            for (((out, &d), &u), &v) in out.iter_mut().zip(&line.depth).zip(rx).zip(ry) {
+                *out = d * (a * u + b * v + c) + shift;
+            }
+        }
+    }
+
+    /// Undoes the sensor's bias; whatever is no depth becomes 0.
+    fn correct(&self, depth: &mut [f32]) {
+        let linear = 1.0 + self.bias.scale as f32;
+        let (offset, quadratic) = (self.bias.offset as f32, 4.0 * self.bias.quadratic as f32);
+        for d in depth {
+            let rest = *d - offset;
+            let depth = 2.0 * rest / (linear + (linear * linear + quadratic * rest).sqrt());
+            *d = if *d > 0.0 && depth > 0.0 && depth < f32::INFINITY { depth } else { 0.0 };
+        }
     }
 }
 
-fn rays(source: Source<'_>) -> Result<Rays> {
-    let Source::Depth(depth, camera) = source else { return Ok(Rays::Own) };
-    camera.validate()?;
-    let pixels = camera.width * camera.height;
-    if depth.len() != pixels {
-        return Err(Error::Shape { what: "depth", got: depth.len(), expected: pixels });
+fn copy(to: &mut [f32], from: &[f32], stride: usize) {
+    if stride == 1 {
+        to.copy_from_slice(from);
+    } else {
+        to.iter_mut().zip(from.iter().step_by(stride)).for_each(|(to, from)| *to = *from);
     }
-    if camera.distortion != Distortion::None {
-        return Ok(Rays::Each(camera.rays()));
+}
+
+fn load_rays<'r>(line: &mut Line, rays: impl Iterator<Item = &'r [f64; 2]>) {
+    let [x, y] = &mut line.rays;
+    for ((x, y), ray) in x.iter_mut().zip(y).zip(rays) {
+        (*x, *y) = (ray[0] as f32, ray[1] as f32);
     }
-    let columns = (0..camera.width).map(|u| camera.ray(u as f64, camera.cy)[0]).collect();
-    let rows = (0..camera.height).map(|v| camera.ray(camera.cx, v as f64)[1]).collect();
-    Ok(Rays::Grid(columns, rows))
+}
+
+fn load_points<'p>(line: &mut Line, points: impl Iterator<Item = &'p [f32; 3]>) {
+    let [x, y] = &mut line.rays;
+    for (((x, y), depth), &[px, py, pz]) in x.iter_mut().zip(y).zip(&mut line.depth).zip(points) {
+        let measured = pz > 0.0 && px.is_finite() && py.is_finite();
+        (*x, *y, *depth) = if measured { (px / pz, py / pz, pz) } else { (0.0, 0.0, 0.0) };
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Vec3;
+    use proptest::prelude::*;
+
+    const BIAS: DepthBias = DepthBias { offset: 3.4397e-3, scale: -0.017878, quadratic: 2.2093e-2 };
+    const POSE: SiloPose = SiloPose { r_x: 0.2, r_y: -0.24, t_x: 0.6, t_y: 0.5 };
+
+    fn all(source: Source<'_>, bias: DepthBias, stride: usize) -> Vec<[f32; 4]> {
+        let mut points = Vec::new();
+        let Ok(returns) = Returns::new(source, bias, &POSE) else { panic!("a frame") };
+        returns.visit(stride, |l| (0..l.len()).for_each(|i| points.push([l.x[i], l.y[i], l.z[i], l.depth[i]])));
+        points
+    }
+
+    proptest! {
+        #[test]
+        fn the_bias_is_undone_and_the_point_moved(d in 0.3f64..8.0, x in -0.6f64..0.6, y in -0.5f64..0.5) {
+            let measured = [BIAS.measured(d) as f32];
+            let found = all(Source::Depth(&measured, Rays::Each(&[[x, y]], 1)), BIAS, 1)[0];
+            let truth = POSE.to_silo(&(Vec3::new(x, y, 1.0) * d));
+            for (found, truth) in found.iter().zip([truth.x, truth.y, truth.z, d]) {
+                prop_assert!((f64::from(*found) - truth).abs() < 4e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn pinholes_rays_and_points_agree() {
+        let (columns, rows) = ([-0.2f32, 0.0, 0.3], [0.1f32, 0.4]);
+        let depth = [1.0f32, 2.0, 0.0, 4.0, f32::NAN, 2.5];
+        let rays: Vec<[f64; 2]> =
+            rows.iter().flat_map(|&y| columns.map(|x| [f64::from(x), f64::from(y)])).collect();
+        let points: Vec<[f32; 3]> =
+            depth.iter().zip(&rays).map(|(&d, r)| [d * r[0] as f32, d * r[1] as f32, d]).collect();
+        let grid = all(Source::Depth(&depth, Rays::Pinhole(&columns, &rows)), DepthBias::default(), 1);
+        assert_eq!(grid, all(Source::Depth(&depth, Rays::Each(&rays, 3)), DepthBias::default(), 1));
+        let cloud = all(Source::Points(&points), DepthBias::default(), 1);
+        assert!(grid.iter().zip(&cloud).all(|(a, b)| (0..4).all(|i| (a[i] - b[i]).abs() < 1e-6)));
+        assert_eq!(grid.iter().filter(|p| p[3] > 0.0).count(), 4);
+        let coarse = all(Source::Depth(&depth, Rays::Pinhole(&columns, &rows)), DepthBias::default(), 2);
+        assert_eq!(coarse, vec![grid[0], grid[2]]);
+    }
+
+    #[test]
+    fn what_is_no_measurement_has_depth_zero() {
+        for measured in [0.0, -1.0, f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+            for bias in [DepthBias::default(), BIAS] {
+                assert_eq!(all(Source::Depth(&[measured], Rays::Each(&[[0.0, 0.0]], 1)), bias, 1)[0][3], 0.0);
+            }
+        }
+    }
+
+    #[test]
+    fn a_depth_of_another_size_is_refused() {
+        let refused = Returns::new(Source::Depth(&[1.0; 5], Rays::Pinhole(&[0.0; 2], &[0.0; 2])), BIAS, &POSE);
+        assert!(matches!(refused, Err(Error::Shape { what: "depth", got: 5, expected: 4 })));
+    }
 }

@@ -36,16 +36,18 @@ pub struct Sums {
 impl Sums {
     /// Adds the observations up; only the lower triangle of `A` is kept.
     pub fn new<'a>(functions: usize, observations: impl IntoIterator<Item = &'a Observation>) -> Self {
-        let mut a = DMatrix::zeros(functions, functions);
+        let mut a = DMatrix::<f64>::zeros(functions, functions);
         let mut b = DVector::zeros(functions);
         let (mut square, mut log) = (0.0, 0.0);
         for o in observations {
             let weight = 1.0 / o.variance;
-            for (place, (i, jet)) in o.row.iter().enumerate() {
-                let scaled = weight * jet[0];
-                b[i] += scaled * o.value;
-                for (j, other) in o.row.iter().take(place + 1) {
-                    a[(i, j)] += scaled * other[0]; // the row's indices increase
+            let columns = a.as_mut_slice();
+            for (place, (j, value)) in o.row.iter().enumerate() {
+                let scaled = weight * value;
+                b[j] += scaled * o.value;
+                let Some(column) = columns.get_mut(j * functions..(j + 1) * functions) else { continue };
+                for (i, other) in o.row.iter().skip(place) {
+                    column[i] += scaled * other; // the row's indices increase, so i >= j
                 }
             }
             square += weight * o.value * o.value;
@@ -66,9 +68,14 @@ impl Sums {
 }
 
 impl Trend {
+    /// Height at a place whose functions are worked out.
+    pub fn height(&self, row: &Row) -> f64 {
+        row.dot(self.coefficients.as_slice())
+    }
+
     /// Height and its derivatives at a place.
-    pub fn jet(&self, row: &Row) -> [f64; 3] {
-        row.jet(self.coefficients.as_slice())
+    pub fn jet(&self, basis: &Basis, place: [f64; 2]) -> [f64; 3] {
+        basis.jet(place, self.coefficients.as_slice())
     }
 
     /// Covariance of the coefficients.
@@ -84,8 +91,8 @@ impl Trend {
 
 /// Variance of the height at a place.
 pub fn variance(covariance: &DMatrix<f64>, row: &Row) -> f64 {
-    let along = |i: usize| row.iter().map(|(j, jet)| covariance[(i, j)] * jet[0]).sum::<f64>();
-    row.iter().map(|(i, jet)| jet[0] * along(i)).sum::<f64>().max(0.0)
+    let along = |i: usize| row.iter().map(|(j, value)| covariance[(i, j)] * value).sum::<f64>();
+    row.iter().map(|(i, value)| value * along(i)).sum::<f64>().max(0.0)
 }
 
 #[cfg(test)]
@@ -114,7 +121,7 @@ mod tests {
             panic!("solvable")
         };
         for place in disc() {
-            let error = trend.jet(&basis.row(place))[0] - height(place[0], place[1]);
+            let error = trend.height(&basis.row(place)) - height(place[0], place[1]);
             assert!(error.abs() < 0.02, "{error} at {place:?}");
         }
     }

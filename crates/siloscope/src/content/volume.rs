@@ -183,13 +183,13 @@ impl Spoke<'_> {
             let row = surface.row(x, y);
             let near = detail::weights(&surface.grid, x, y);
             let extra: f64 = near.iter().map(|&(i, w)| w * surface.detail[i]).sum();
-            let z = surface.datum + surface.trend.jet(&row)[0] * surface.grid.reach + extra;
+            let z = surface.datum + surface.trend.height(&row) * surface.grid.reach + extra;
             sums.volume += ring * (self.vessel.floor(r) - z);
             sums.area += ring;
             sums.moment += ring * z;
             sums.seen += if matches!(self.kind(r), Kind::Feed | Kind::Rim) { ring } else { 0.0 };
             sums.extremes = [sums.extremes[0].min(z), sums.extremes[1].max(z)];
-            row.iter().for_each(|(i, jet)| sums.functions[i] += ring * jet[0] * surface.grid.reach);
+            row.iter().for_each(|(i, value)| sums.functions[i] += ring * value * surface.grid.reach);
             near.iter().for_each(|&(i, w)| sums.cells[i] += ring * w);
             self.floor_moves(r, ring, &mut sums.geometry);
         }
