@@ -1,84 +1,277 @@
 //! Content: surface map and volume.
 
 use crate::convert::{self, value_error};
-use numpy::{PyArray1, PyArrayMethods, PyReadonlyArray2, PyReadonlyArrayDyn};
+use numpy::{
+    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use siloscope::content::cells::Cell;
+use siloscope::content::classify::Thing;
+use siloscope::content::cloud::Relief;
 use siloscope::content::doubt::Covariance;
-use siloscope::content::measure::{Content, Setup, measure};
+use siloscope::content::fit::Surface;
+use siloscope::content::measure::{Content, Setup, measure, shape_of};
 use siloscope::content::returns::{Rays, Source};
+use siloscope::content::shape::{Form, Shape};
 use siloscope::content::vessel::Vessel;
-use siloscope::SiloPose;
+use siloscope::content::volume::Kind;
 use siloscope::sensor::{DepthBias, NoiseLaw};
+use siloscope::{Camera, SiloPose, Vec3};
 
 fn vessel([radius, cylinder_bottom, apex, top, outlet_radius, outlet_length]: [f64; 6]) -> Vessel {
     Vessel { radius, cylinder_bottom, apex, top, outlet_radius, outlet_length }
 }
 
+fn noise_law([floor, constant, linear, quadratic, power_factor, power]: [f64; 6]) -> NoiseLaw {
+    NoiseLaw { floor, constant, linear, quadratic, power_factor, power }
+}
+
+/// Volume of a silo (radius, cylinder_bottom, apex, top, outlet radius and length) below level planes at heights z.
 #[pyfunction]
+fn vessel_volume_below(silo: [f64; 6], z: Vec<f64>) -> PyResult<Vec<f64>> {
+    let vessel = vessel(silo);
+    vessel.validate().map_err(value_error)?;
+    Ok(z.into_iter().map(|z| vessel.volume_below(z)).collect())
+}
+
+/// Measures the content of a depth image (float32 (H, W), metres, with its camera) or of points (float32 (N, 3)).
+///
+/// `rays` (H, W, 2) are needed where the camera's lens distorts. Returns plain numbers, and the surface or None.
+#[pyfunction]
+#[pyo3(signature = (data, camera, rays, pose, silo, covariance, wall_std, bias, noise, range))]
 #[allow(clippy::too_many_arguments)]
-fn measure_content<'py>(
+fn content_measure<'py>(
     py: Python<'py>,
-    depth: PyReadonlyArrayDyn<'py, f32>,
+    data: PyReadonlyArray2<'py, f32>,
     camera: Option<&Bound<'py, PyAny>>,
+    rays: Option<PyReadonlyArray3<'py, f64>>,
     pose: [f64; 4],
     silo: [f64; 6],
     covariance: PyReadonlyArray2<'py, f64>,
     wall_std: f64,
     bias: [f64; 3],
-    noise: [f64; 3],
-) -> PyResult<Bound<'py, PyDict>> {
+    noise: [f64; 6],
+    range: [f64; 2],
+) -> PyResult<(Bound<'py, PyDict>, Option<ContentSurface>)> {
     let camera = camera.map(convert::camera).transpose()?;
-    let covariance = Covariance::from_iterator(covariance.as_array().iter().copied());
-    let [r_x, r_y, t_x, t_y] = pose;
-    let setup = Setup { pose: SiloPose { r_x, r_y, t_x, t_y }, vessel: vessel(silo), covariance, wall_std,
+    let setup = Setup {
+        pose: SiloPose { r_x: pose[0], r_y: pose[1], t_x: pose[2], t_y: pose[3] },
+        vessel: vessel(silo),
+        covariance: matrix(&covariance)?,
+        wall_std,
         bias: DepthBias { offset: bias[0], scale: bias[1], quadratic: bias[2] },
-        noise: NoiseLaw { floor: 0.0, constant: noise[0], linear: noise[1], quadratic: noise[2], power_factor: 0.0, power: 1.0 } };
-    let depth = depth.as_slice()?;
-    let content = py.detach(|| match &camera {
-        Some(c) => {
-            let columns: Vec<f32> = (0..c.width).map(|u| c.ray(u as f64, c.cy)[0] as f32).collect();
-            let rows: Vec<f32> = (0..c.height).map(|v| c.ray(c.cx, v as f64)[1] as f32).collect();
-            measure(Source::Depth(depth, Rays::Pinhole(&columns, &rows)), &setup)
+        noise: noise_law(noise),
+        range,
+    };
+    let shape = (data.shape()[0], data.shape()[1]);
+    let numbers = data.as_slice().map_err(value_error)?;
+    let rays = rays.as_ref().map(|r| r.as_slice()).transpose().map_err(value_error)?;
+    let content = match &camera {
+        None if shape.1 == 3 => py.detach(|| measure(Source::Points(numbers.as_chunks::<3>().0), &setup)),
+        None => return Err(value_error(format!("points have shape {shape:?}, expected (N, 3)"))),
+        Some(camera) if (camera.height, camera.width) != shape => {
+            let expected = (camera.height, camera.width);
+            return Err(value_error(format!("the depth has shape {shape:?}, its camera {expected:?}")));
         }
-        None => measure(Source::Points(depth.as_chunks::<3>().0), &setup),
-    });
-    report(py, &content.map_err(value_error)?)
+        Some(camera) => py.detach(|| measure_image(numbers, camera, rays, &setup)),
+    };
+    let content = content.map_err(value_error)?;
+    Ok((report(py, &content)?, ContentSurface::of_content(content)))
+}
+
+fn measure_image(depth: &[f32], camera: &Camera, rays: Option<&[f64]>, setup: &Setup) -> siloscope::Result<Content> {
+    if let Some(rays) = rays {
+        return measure(Source::Depth(depth, Rays::Each(rays.as_chunks::<2>().0, camera.width)), setup);
+    }
+    let columns: Vec<f32> = (0..camera.width).map(|u| camera.ray(u as f64, camera.cy)[0] as f32).collect();
+    let rows: Vec<f32> = (0..camera.height).map(|v| camera.ray(camera.cx, v as f64)[1] as f32).collect();
+    measure(Source::Depth(depth, Rays::Pinhole(&columns, &rows)), setup)
+}
+
+fn matrix(covariance: &PyReadonlyArray2<'_, f64>) -> PyResult<Covariance> {
+    if covariance.shape() != [10, 10] {
+        return Err(value_error(format!("the covariance has shape {:?}, expected [10, 10]", covariance.shape())));
+    }
+    Ok(Covariance::from_iterator(covariance.as_array().iter().copied()))
 }
 
 fn report<'py>(py: Python<'py>, content: &Content) -> PyResult<Bound<'py, PyDict>> {
     let out = PyDict::new(py);
-    let n = content.grid.side;
-    let heights = |f: &dyn Fn(usize) -> f64| {
-        PyArray1::from_vec(py, (0..content.grid.len()).map(f).collect()).reshape([n, n])
-    };
-    out.set_item("reach", content.grid.reach)?;
-    out.set_item("kinds", PyArray1::from_vec(py, content.kinds.iter().map(|k| *k as u8).collect()).reshape([n, n])?)?;
-    out.set_item("z_cell", heights(&|i| content.cells[i].mean[2])?)?;
-    out.set_item("count", heights(&|i| content.cells[i].count)?)?;
-    if let (Some(s), Some(v)) = (&content.surface, &content.volume) {
-        let at = |i: usize| content.grid.middle(i);
-        out.set_item("z", heights(&|i| s.height(at(i)[0], at(i)[1]))?)?;
-        out.set_item("volume", v.volume)?;
-        out.set_item("area", v.area)?;
-        out.set_item("seen", v.seen)?;
-        out.set_item("roughness", s.roughness)?;
-        out.set_item("patch", s.patch)?;
+    if let Some(v) = &content.volume {
+        let volume = PyDict::new(py);
+        volume.set_item("volume", v.volume)?;
+        volume.set_item("area", v.area)?;
+        volume.set_item("seen", v.seen)?;
+        volume.set_item("moment", v.moment)?;
+        volume.set_item("extremes", v.extremes)?;
+        volume.set_item("at_wall", v.at_wall)?;
+        volume.set_item("wall_share", v.wall_share)?;
+        out.set_item("volume", volume)?;
+    } else {
+        out.set_item("volume", py.None())?;
     }
+    let doubts = PyDict::new(py);
     let d = &content.doubts;
-    for (name, value) in [
-        ("pose", d.pose), ("geometry", d.geometry), ("depth", d.depth), ("noise", d.noise), ("unseen", d.unseen),
-        ("grid", d.grid), ("total", d.total),
+    for (name, std) in [
+        ("pose", d.pose),
+        ("geometry", d.geometry),
+        ("depth", d.depth),
+        ("noise", d.noise),
+        ("unseen", d.unseen),
+        ("grid", d.grid),
+        ("total", d.total),
     ] {
-        out.set_item(format!("std_{name}"), value)?;
+        doubts.set_item(name, std)?;
     }
+    out.set_item("std", doubts)?;
     out.set_item("derivatives", content.derivatives.as_slice().to_vec())?;
-    out.set_item("things", content.things.iter().map(|t| (t.cells.len(), t.above, t.at_wall)).collect::<Vec<_>>())?;
+    let count = |kind: Kind| content.kinds.iter().filter(|k| **k == kind).count();
+    let kinds = [Kind::Unseen, Kind::Feed, Kind::Rim, Kind::Bare, Kind::Clutter].map(count);
+    out.set_item("kinds", kinds)?;
+    let cell_area = content.grid.cell().powi(2);
+    let list = |things: &[Thing]| {
+        things.iter().map(|t| (t.cells.len() as f64 * cell_area, t.above, t.at_wall)).collect::<Vec<_>>()
+    };
+    out.set_item("things", list(&content.things))?;
+    out.set_item("holes", list(&content.holes))?;
+    out.set_item("shape", content.shape.as_ref().map(|s| shape(py, s)).transpose()?)?;
     let t = &content.tally;
-    out.set_item("tally", [t.returns, t.wall, t.outside, t.above, t.coherent])?;
+    out.set_item("tally", (t.returns, t.wall, t.outside, t.above, t.coherent))?;
+    let s = &content.sight;
+    out.set_item("sight", (s.measured, s.blind, s.near))?;
+    out.set_item("shift", content.shift.map(|s| (s.change, s.std, s.rms, s.returns)))?;
     Ok(out)
 }
 
+fn shape<'py>(py: Python<'py>, shape: &Shape) -> PyResult<Bound<'py, PyDict>> {
+    let out = PyDict::new(py);
+    let form = match shape.form {
+        Form::Flat => "flat",
+        Form::Tilted => "tilted",
+        Form::Mound => "mound",
+        Form::Funnel => "funnel",
+        Form::Irregular => "irregular",
+    };
+    out.set_item("form", form)?;
+    out.set_item("flank", shape.flank)?;
+    out.set_item("steepness", shape.steepness)?;
+    out.set_item("centre", shape.centre)?;
+    out.set_item("tilt", shape.tilt)?;
+    out.set_item("asymmetry", shape.asymmetry)?;
+    out.set_item("irregularity", shape.irregularity)?;
+    Ok(out)
+}
+
+/// The surface of one frame or cloud, z down from its own zero.
+#[pyclass(frozen, module = "siloscope._core")]
+struct ContentSurface {
+    surface: Surface,
+    cells: Vec<Cell>,
+    kinds: Vec<Kind>,
+    ceiling: f64,
+    axes: [[f64; 3]; 3],
+}
+
+const STANDING: [[f64; 3]; 3] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+
+impl ContentSurface {
+    fn of_content(content: Content) -> Option<Self> {
+        let surface = content.surface?;
+        Some(Self { surface, cells: content.cells, kinds: content.kinds, ceiling: 0.0, axes: STANDING })
+    }
+
+    fn of_relief(relief: Relief) -> Self {
+        let axes = [0, 1, 2].map(|i| [0, 1, 2].map(|j| relief.axes[(i, j)]));
+        Self { surface: relief.surface, cells: relief.cells, kinds: relief.kinds, ceiling: relief.ceiling, axes }
+    }
+
+    fn map<'py, T: numpy::Element>(
+        &self,
+        py: Python<'py>,
+        value: impl Fn(usize) -> T,
+    ) -> PyResult<Bound<'py, PyArray2<T>>> {
+        let side = self.surface.grid.side;
+        PyArray1::from_iter(py, (0..side * side).map(value)).reshape([side, side])
+    }
+}
+
+#[pymethods]
+impl ContentSurface {
+    /// Centre, half side (m) and cells along a side of the square map.
+    #[getter]
+    fn grid(&self) -> ([f64; 2], f64, usize) {
+        (self.surface.grid.centre, self.surface.grid.reach, self.surface.grid.side)
+    }
+
+    /// Height of z = 0 over the cloud's own zero; 0 for a silo.
+    #[getter]
+    fn ceiling(&self) -> f64 {
+        self.ceiling
+    }
+
+    /// Rows: the two horizontal axes and up, in the axes of the cloud.
+    #[getter]
+    fn axes(&self) -> [[f64; 3]; 3] {
+        self.axes
+    }
+
+    /// What each cell shows (n, n): 0 nothing, 1 content, 2 content's rim, 3 bare floor, 4 something else.
+    fn kinds<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<u8>>> {
+        self.map(py, |i| self.kinds.get(i).map_or(0, |k| *k as u8))
+    }
+
+    /// z of the surface at the cells' middles (n, n), rows along y.
+    fn z<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        self.map(py, |i| {
+            let [x, y] = self.surface.grid.middle(i);
+            self.surface.height(x, y)
+        })
+    }
+
+    /// Standard deviation of that z (n, n): what noise and the unseen leave.
+    fn std<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let std = py.detach(|| self.surface.deviations(&self.cells));
+        self.map(py, |i| std.get(i).copied().unwrap_or(f64::NAN))
+    }
+
+    /// z of the surface at places (N, 2).
+    fn z_at<'py>(&self, py: Python<'py>, places: PyReadonlyArray2<'py, f64>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        if places.shape()[1] != 2 {
+            return Err(value_error(format!("places have shape {:?}, expected (N, 2)", places.shape())));
+        }
+        let places = places.as_array();
+        let z = places.rows().into_iter().map(|p| self.surface.height(p[0], p[1]));
+        Ok(PyArray1::from_iter(py, z))
+    }
+
+    /// Shape of the seen part, or None where it is too small.
+    fn shape<'py>(&self, py: Python<'py>) -> PyResult<Option<Bound<'py, PyDict>>> {
+        shape_of(&self.surface, &self.cells, self.surface.grid.reach).map(|s| shape(py, &s)).transpose()
+    }
+}
+
+/// Maps a bare point cloud (N, 3) over the plane perpendicular to `up`; None where there are too few points.
+#[pyfunction]
+#[pyo3(signature = (points, up, cell, noise))]
+fn content_relief(
+    py: Python<'_>,
+    points: PyReadonlyArrayDyn<'_, f64>,
+    up: [f64; 3],
+    cell: Option<f64>,
+    noise: f64,
+) -> PyResult<Option<ContentSurface>> {
+    if points.ndim() != 2 || points.shape()[1] != 3 {
+        return Err(value_error(format!("points have shape {:?}, expected (N, 3)", points.shape())));
+    }
+    let points: Vec<[f64; 3]> = points.as_slice().map_err(value_error)?.as_chunks::<3>().0.to_vec();
+    let relief = py.detach(|| Relief::new(&points, &Vec3::from(up), cell, noise)).map_err(value_error)?;
+    Ok(relief.map(ContentSurface::of_relief))
+}
+
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
-    m.add_function(wrap_pyfunction!(measure_content, m)?)
+    m.add_function(wrap_pyfunction!(vessel_volume_below, m)?)?;
+    m.add_function(wrap_pyfunction!(content_measure, m)?)?;
+    m.add_function(wrap_pyfunction!(content_relief, m)?)?;
+    m.add_class::<ContentSurface>()
 }

@@ -5,7 +5,7 @@
 //! the rest is a Matérn field (smoothness 3/2, range one radius) on a lattice of cubic B-splines. Where nothing is seen
 //! the surface goes on with the slope it had, and what it may do instead grows with the distance.
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, Matrix2, Vector2};
 use std::sync::OnceLock;
 
 /// Distance between the profile's knots.
@@ -22,6 +22,8 @@ const OUTERMOST: f64 = 1.7;
 const LEVEL: f64 = 10.0;
 const TILT: f64 = 0.3;
 const SLOPE: f64 = 0.5;
+/// Standard deviation of a heap's centre about the axis before anything is seen, in radii.
+const OFF_AXIS: f64 = 0.5;
 /// Functions before the knots.
 const FIRST: usize = 4;
 /// Functions that are not zero at one place, at most.
@@ -161,6 +163,22 @@ impl Basis {
         q.view_mut((n - m, n - m), (m, m)).copy_from(&(precision * scale));
         (q, log + determinant + m as f64 * scale.ln())
     }
+}
+
+/// Where the lines of steepest slope meet, in radii, given places and slopes there: least squares over the lines' distances, steep places counting more.
+pub fn meeting_point(slopes: impl Iterator<Item = ([f64; 2], [f64; 2])>) -> Option<[f64; 2]> {
+    let (mut a, mut b) = (Matrix2::zeros(), Vector2::zeros());
+    let mut steepness = 0.0;
+    for (place, [zx, zy]) in slopes {
+        let across = Vector2::new(-zy, zx);
+        a += across * across.transpose();
+        b += across * across.dot(&Vector2::from(place));
+        steepness += across.norm_squared();
+    }
+    // a line is known to a tenth of a radius; the prior keeps the centre of a plane at the axis
+    a += Matrix2::identity() * (0.01 / (OFF_AXIS * OFF_AXIS) * steepness);
+    let centre: Vector2<f64> = a.lu().solve(&b)?;
+    (centre.norm() <= 1.0 && centre.norm() > 0.01).then_some(centre.into())
 }
 
 /// The lattice's points near the disc, and for each range the precision of a Matérn field of variance 1 on them with

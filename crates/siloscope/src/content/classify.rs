@@ -23,14 +23,16 @@ pub struct Classified {
     pub surface: Option<Surface>,
     /// Things above the surface, by size.
     pub things: Vec<Thing>,
+    /// Steep holes: parts of the surface that lie far below the rest, by size.
+    pub holes: Vec<Thing>,
 }
 
-/// Neighbouring cells that float above the surface.
+/// Neighbouring cells that steep steps part from the surface.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Thing {
     /// Its cells.
     pub cells: Vec<usize>,
-    /// Mean height above the surface, metres.
+    /// Mean height above the surface's trend, metres; negative for a hole.
     pub above: f64,
     /// Whether it reaches the silo's wall.
     pub at_wall: bool,
@@ -71,10 +73,10 @@ fn mean_radius([x, y, _]: [f64; 3], cell: f64) -> f64 {
 pub fn classify(grid: &Grid, cells: &[Cell], floor: &Floor<'_>) -> Classified {
     let covered: Vec<bool> = cells.iter().map(|c| c.seen() && floor.covered(c, grid)).collect();
     let main = main_part(grid, cells, &covered);
-    let mut things = Vec::new();
+    let (mut things, mut holes) = (Vec::new(), Vec::new());
     let mut surface = None;
     if let Some(sketch) = sketch(grid, cells, &main) {
-        things = things_above(grid, cells, &covered, &main, &sketch, floor.vessel);
+        (things, holes) = parted(grid, cells, &covered, &main, &sketch, floor.vessel);
         let mut take = covered.clone();
         things.iter().flat_map(|t: &Thing| &t.cells).for_each(|&i| take[i] = false);
         for (take, cell) in take.iter_mut().zip(cells) {
@@ -83,7 +85,7 @@ pub fn classify(grid: &Grid, cells: &[Cell], floor: &Floor<'_>) -> Classified {
         surface = fit(&sketch, cells, &take).or(Some(sketch));
     }
     let kinds = kinds(grid, cells, &covered, &things);
-    Classified { kinds, surface, things }
+    Classified { kinds, surface, things, holes }
 }
 
 /// Whether the content's rim stays out of a cell.
@@ -151,8 +153,15 @@ fn main_part(grid: &Grid, cells: &[Cell], covered: &[bool]) -> Vec<bool> {
     labels.iter().map(|&label| Some(label) == largest).collect()
 }
 
-/// Parts that float above the surface.
-fn things_above(grid: &Grid, cells: &[Cell], covered: &[bool], main: &[bool], surface: &Surface, vessel: &Vessel) -> Vec<Thing> {
+/// Parts that float above the surface, and parts that lie in holes.
+fn parted(
+    grid: &Grid,
+    cells: &[Cell],
+    covered: &[bool],
+    main: &[bool],
+    surface: &Surface,
+    vessel: &Vessel,
+) -> (Vec<Thing>, Vec<Thing>) {
     let (labels, sizes) = parts(grid, cells, covered);
     let mut found: Vec<Thing> = vec![Thing { cells: Vec::new(), above: 0.0, at_wall: false }; sizes.len()];
     for i in (0..grid.len()).filter(|&i| covered[i] && !main[i]) {
@@ -164,7 +173,7 @@ fn things_above(grid: &Grid, cells: &[Cell], covered: &[bool], main: &[bool], su
     }
     found.iter_mut().for_each(|t| t.above /= t.cells.len().max(1) as f64);
     let least = (3.0 * surface.roughness).max(STEEPEST * grid.cell());
-    found.retain(|t| !t.cells.is_empty() && t.above > least);
+    found.retain(|t| t.above.abs() > least);
     found.sort_by_key(|t| std::cmp::Reverse(t.cells.len()));
-    found
+    found.into_iter().partition(|t| t.above > 0.0)
 }

@@ -1,11 +1,10 @@
 //! The surface through the cells: trend, then the detail that the trend is too smooth for.
 
-use super::basis::{Basis, RANGES, Roughness, Row};
+use super::basis::{Basis, RANGES, Roughness, Row, meeting_point};
 use super::cells::Cell;
 use super::detail;
 use super::grid::Grid;
-use super::trend::{Observation, Sums, Trend};
-use nalgebra::{Matrix2, Vector2};
+use super::trend::{Observation, Sums, Trend, variance};
 
 /// A residual beyond so many robust standard deviations counts less, the more so the farther it is.
 const HUBER: f64 = 2.5;
@@ -19,8 +18,6 @@ const RESTS: [f64; 6] = [0.002, 0.005, 0.012, 0.03, 0.07, 0.16];
 /// Roughness under which two centres are compared, and how much more probable the cells must be about the new one.
 const TRIED: Roughness = Roughness { bend: 0.5, rest: 0.012, range: 0 };
 const GAIN: f64 = 3.0;
-/// Standard deviation of a heap's centre about the axis before anything is seen, in radii.
-const OFF_AXIS: f64 = 0.5;
 /// Smallest standard deviation of a cell's height, metres: what rounding and a cell's own curvature leave.
 const SMALLEST: f64 = 5e-4;
 /// Fewest cells that make a surface.
@@ -71,6 +68,19 @@ impl Surface {
     /// z of the surface at a place.
     pub fn height(&self, x: f64, y: f64) -> f64 {
         self.trend_at(x, y)[0] + detail::between(&self.grid, &self.detail, x, y)
+    }
+
+    /// Standard deviation of the height at each cell's middle: the trend's, and the detail's where it is not seen.
+    pub fn deviations(&self, cells: &[Cell]) -> Vec<f64> {
+        let covariance = self.trend.covariance();
+        let deviation = |i: usize| {
+            let [x, y] = self.grid.middle(i);
+            let trend = variance(&covariance, &self.row(x, y)) * self.grid.reach.powi(2);
+            let kept = self.kept(i);
+            let detail = if kept > 0.0 { kept * cells[i].variance } else { self.roughness.powi(2) };
+            ((1.0 - kept).powi(2) * trend + detail).sqrt()
+        };
+        (0..self.grid.len()).map(deviation).collect()
     }
 
     /// Share of a cell's deviation from the trend that is taken for the surface's own.
@@ -171,7 +181,7 @@ impl<'a> Work<'a> {
         let sums = |basis: &Basis, observations: &[Observation]| Sums::new(basis.len(), observations);
         let about_axis = sums(&self.basis, &self.observations);
         let place = |i: &usize| unit(self.grid, cells[*i].mean);
-        let slopes = self.cells.iter().map(|i| (place(i), sketch.trend.jet(&sketch.basis, place(i))));
+        let slopes = self.cells.iter().map(place).map(|at| (at, sketch.trend.slopes(&sketch.basis, at)));
         let Some(centre) = meeting_point(slopes) else { return about_axis };
         let basis = Basis::new(centre);
         let moved: Vec<Observation> = (self.cells.iter().zip(&self.observations))
@@ -262,22 +272,6 @@ fn most_probable(sums: &Sums, basis: &Basis) -> Option<(Roughness, Trend)> {
             _ => return Some((at.roughness(), best)),
         }
     }
-}
-
-/// Where the lines of steepest slope meet: least squares over the lines' distances, steep places counting more.
-fn meeting_point(slopes: impl Iterator<Item = ([f64; 2], [f64; 3])>) -> Option<[f64; 2]> {
-    let (mut a, mut b) = (Matrix2::zeros(), Vector2::zeros());
-    let mut steepness = 0.0;
-    for (place, [_, zx, zy]) in slopes {
-        let across = Vector2::new(-zy, zx);
-        a += across * across.transpose();
-        b += across * across.dot(&Vector2::from(place));
-        steepness += across.norm_squared();
-    }
-    // a line is known to a tenth of a radius; the prior keeps the centre of a plane at the axis
-    a += Matrix2::identity() * (0.01 / (OFF_AXIS * OFF_AXIS) * steepness);
-    let centre: Vector2<f64> = a.lu().solve(&b)?;
-    (centre.norm() <= 1.0 && centre.norm() > 0.01).then_some(centre.into())
 }
 
 /// A place in the lists of values tried for the roughness.

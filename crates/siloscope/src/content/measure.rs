@@ -6,8 +6,12 @@ use super::doubt::{Covariance, DEPTH, GEOMETRY, Lever, POSE, Parameters, deviati
 use super::fit::Surface;
 use super::grid::Grid;
 use super::returns::{Returns, Source};
+use super::shape::{Sample, Shape, shape};
+use super::sight::{Sight, sight};
+use super::trend::Observation;
 use super::vessel::Vessel;
 use super::volume::{Kind, Volume, integrate};
+use super::wall::{Shift, shift};
 use super::{cells::Cell, detail};
 use crate::sensor::{DepthBias, NoiseLaw};
 use crate::{Result, SiloPose};
@@ -28,6 +32,8 @@ pub struct Setup {
     pub bias: DepthBias,
     /// The sensor's noise.
     pub noise: NoiseLaw,
+    /// Depths that the sensor can measure.
+    pub range: [f64; 2],
 }
 
 /// Standard deviations of the volume, cubic metres.
@@ -68,8 +74,16 @@ pub struct Content {
     pub derivatives: Parameters,
     /// Things above the surface.
     pub things: Vec<Thing>,
+    /// Steep holes in the surface.
+    pub holes: Vec<Thing>,
+    /// The surface's shape, from the cells that show it.
+    pub shape: Option<Shape>,
     /// Counts of the frame.
     pub tally: Tally,
+    /// How much the sensor sees.
+    pub sight: Sight,
+    /// Whether the wall still lies where the calibration has it.
+    pub shift: Option<Shift>,
 }
 
 /// Measures the content.
@@ -81,13 +95,28 @@ pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
     let (cells, tally) = gather(&returns, &bound(setup), &grid, &setup.noise, &lever);
     let floor =
         Floor { vessel: &setup.vessel, lever: &lever, covariance: &setup.covariance, wall_std: setup.wall_std };
-    let Classified { kinds, surface, things } = classify(&grid, &cells, &floor);
+    let Classified { kinds, surface, things, holes } = classify(&grid, &cells, &floor);
     let volume = surface.as_ref().map(|s| integrate(s, &setup.vessel, &kinds));
     let (doubts, derivatives) = match (&surface, &volume) {
         (Some(surface), Some(volume)) => doubts(surface, volume, &cells, &lever, &setup.covariance),
         _ => (Doubts::default(), Parameters::zeros()),
     };
-    Ok(Content { grid, cells, kinds, surface, volume, doubts, derivatives, things, tally })
+    let shape = surface.as_ref().and_then(|s| shape_of(s, &cells, setup.vessel.radius));
+    let sight = sight(source, &returns, &setup.vessel, &setup.pose, setup.range);
+    let shift = shift(&returns, &setup.vessel, &lever, &setup.noise, &setup.covariance);
+    Ok(Content { grid, cells, kinds, surface, volume, doubts, derivatives, things, holes, shape, tally, sight, shift })
+}
+
+/// Shape of the seen part of a surface; heights upwards.
+pub fn shape_of(surface: &Surface, cells: &[Cell], reach: f64) -> Option<Shape> {
+    let sample = |(i, _): &(usize, Observation)| {
+        let [x, y, _] = cells[*i].mean;
+        let [z, zx, zy] = surface.trend_at(x, y);
+        let detail = detail::between(&surface.grid, &surface.detail, x, y);
+        Sample { place: [x, y], height: -(z + detail), slope: [-zx, -zy] }
+    };
+    let samples: Vec<Sample> = surface.used.iter().map(sample).collect();
+    shape(&samples, surface.grid.centre, reach)
 }
 
 /// The cylinder with the variance of a point's distance to it.
@@ -116,7 +145,7 @@ fn influences(surface: &Surface, volume: &Volume) -> (Vec<f64>, DVector<f64>) {
         kept.push(weight);
     }
     let spread = surface.trend.spread(&left);
-    let through = |o: &super::trend::Observation| {
+    let through = |o: &Observation| {
         o.row.iter().map(|(j, value)| spread[j] * value).sum::<f64>() / (o.variance * reach)
     };
     let all = surface.used.iter().zip(kept).map(|((_, o), weight)| weight + through(o)).collect();

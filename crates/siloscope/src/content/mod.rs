@@ -3,12 +3,16 @@
 pub mod basis;
 pub mod cells;
 pub mod classify;
+pub mod cloud;
 pub mod detail;
 pub mod doubt;
 pub mod fit;
 pub mod grid;
 pub mod measure;
 pub mod returns;
+pub mod shape;
+pub mod sight;
 pub mod trend;
 pub mod vessel;
 pub mod volume;
+pub mod wall;

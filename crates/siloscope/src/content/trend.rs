@@ -78,6 +78,12 @@ impl Trend {
         basis.jet(place, self.coefficients.as_slice())
     }
 
+    /// Derivatives of the height at a place.
+    pub fn slopes(&self, basis: &Basis, place: [f64; 2]) -> [f64; 2] {
+        let [_, du, dv] = self.jet(basis, place);
+        [du, dv]
+    }
+
     /// Covariance of the coefficients.
     pub fn covariance(&self) -> DMatrix<f64> {
         self.factor.inverse()
