@@ -5,6 +5,7 @@ from siloscope._core import __version__
 from siloscope.calibrate import calibrate
 from siloscope.calibration import Calibration
 from siloscope.camera import Camera
+from siloscope.content import Content, SurfaceMap, measure, surface_map, volume_between
 from siloscope.errors import InputError, SiloscopeError, UsageError
 from siloscope.estimate import Estimate, Ratios, SiloGeometry
 from siloscope.frame import Frame
@@ -14,6 +15,7 @@ from siloscope.pose import SiloPose
 __all__ = [
     "Calibration",
     "Camera",
+    "Content",
     "Estimate",
     "Frame",
     "InputError",
@@ -21,9 +23,13 @@ __all__ = [
     "SiloGeometry",
     "SiloPose",
     "SiloscopeError",
+    "SurfaceMap",
     "UsageError",
     "__version__",
     "calibrate",
     "frames",
     "locate",
+    "measure",
+    "surface_map",
+    "volume_between",
 ]

@@ -1,5 +1,5 @@
 from os import PathLike
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -99,3 +99,33 @@ def shape_tensor_image(
 def shape_tensor_points(
     points: NDArray[np.float64], settings: tuple[float, int, str, float, float, int, int]
 ) -> dict[str, Any]: ...
+def vessel_volume_below(silo: tuple[float, ...], z: list[float]) -> list[float]: ...
+def content_measure(
+    data: NDArray[np.float32],
+    camera: Any | None,
+    rays: NDArray[np.float64] | None,
+    pose: tuple[float, ...],
+    silo: tuple[float, ...],
+    covariance: NDArray[np.float64],
+    wall_std: float,
+    bias: tuple[float, ...],
+    noise: tuple[float, ...],
+    range: tuple[float, float],
+) -> tuple[dict[str, Any], ContentSurface | None]: ...
+def content_relief(
+    points: NDArray[np.float64], up: tuple[float, float, float], cell: float | None, noise: float
+) -> ContentSurface | None: ...
+
+@final
+class ContentSurface:
+    @property
+    def grid(self) -> tuple[list[float], float, int]: ...
+    @property
+    def ceiling(self) -> float: ...
+    @property
+    def axes(self) -> list[list[float]]: ...
+    def kinds(self) -> NDArray[np.uint8]: ...
+    def z(self) -> NDArray[np.float64]: ...
+    def std(self) -> NDArray[np.float64]: ...
+    def z_at(self, places: NDArray[np.float64]) -> NDArray[np.float64]: ...
+    def shape(self) -> dict[str, Any] | None: ...

@@ -287,10 +287,13 @@ def _with_covariance(stack: Stack, weights: Vector, base: Sums, centre: Vector, 
 
 
 def _scale_share(centre: Vector, std: float) -> Matrix:
-    """Every length of the answer goes with an unknown scale, however many frames there are."""
+    """Every length of the answer goes with an unknown scale, however many frames there are.
+
+    A measured depth means ``d (1 + scale)``: where all lengths are too long by a share, the scale is too small by it.
+    """
     share = np.zeros(SIZE)
     share[list(LENGTHS)] = np.nan_to_num(centre[list(LENGTHS)]) * std
-    share[SCALE] = std
+    share[SCALE] = -(1.0 + np.nan_to_num(centre[SCALE])) * std
     share[QUADRATIC] = -2.0 * np.nan_to_num(centre[QUADRATIC]) * std
     return np.outer(share, share)
 

@@ -107,6 +107,7 @@ fn report<'py>(py: Python<'py>, content: &Content) -> PyResult<Bound<'py, PyDict
         volume.set_item("extremes", v.extremes)?;
         volume.set_item("at_wall", v.at_wall)?;
         volume.set_item("wall_share", v.wall_share)?;
+        volume.set_item("reach", v.reach)?;
         out.set_item("volume", volume)?;
     } else {
         out.set_item("volume", py.None())?;
@@ -136,6 +137,8 @@ fn report<'py>(py: Python<'py>, content: &Content) -> PyResult<Bound<'py, PyDict
     out.set_item("things", list(&content.things))?;
     out.set_item("holes", list(&content.holes))?;
     out.set_item("shape", content.shape.as_ref().map(|s| shape(py, s)).transpose()?)?;
+    out.set_item("bare", content.bare)?;
+    out.set_item("sunken", content.sunken)?;
     let t = &content.tally;
     out.set_item("tally", (t.returns, t.wall, t.outside, t.above, t.coherent))?;
     let s = &content.sight;

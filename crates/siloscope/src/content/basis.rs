@@ -1,9 +1,10 @@
 //! What a feed surface is made of: a level, a tilt, a profile about a centre, and a smooth rest.
 //!
-//! In units of the silo's radius, `z(u, v) = a + b u + c v + s ρ + Σ δ_k (ρ - ρ_k)₊ + Σ g_j B_j(u, v)`, where ρ is the
-//! distance from the heap's centre. Bulk solids lie at about one angle, so the profile's slope is a random walk over ρ;
-//! the rest is a Matérn field (smoothness 3/2, range one radius) on a lattice of cubic B-splines. Where nothing is seen
-//! the surface goes on with the slope it had, and what it may do instead grows with the distance.
+//! In units of the silo's radius, `z(u, v) = a + b u + c v + Σ s_i √(ρ² + t_i²) + Σ κ_k F_k(ρ) + Σ g_j B_j(u, v)`, where ρ
+//! is the distance from the heap's centre. Bulk solids lie at about one angle, so the profile is a cone with a more or
+//! less rounded tip, bent by a curvature that varies smoothly with ρ (F_k is a hat function integrated twice); the rest
+//! is a Matérn field (smoothness 3/2) on a lattice of cubic B-splines. Where nothing is seen the surface goes on with
+//! the slope it had, and what it may do instead grows with the distance.
 
 use nalgebra::{DMatrix, Matrix2, Vector2};
 use std::sync::OnceLock;
@@ -11,28 +12,32 @@ use std::sync::OnceLock;
 /// Distance between the profile's knots.
 const KNOT: f64 = 0.1;
 /// Most knots of a profile: those of a heap at the wall.
-const MOST_KNOTS: usize = 20;
+const MOST_KNOTS: usize = 21;
 /// Distance between the lattice's points.
 const PITCH: f64 = 1.0 / 3.0;
 /// Lattice points along a side: those whose splines reach into [-1, 1].
 const SIDE: usize = 9;
 /// Lattice points farther out have less than a millionth of a weight in the disc.
 const OUTERMOST: f64 = 1.7;
-/// Standard deviation of the level, of the tilt's slopes, and of the profile's slope at the centre.
+/// Radii over which the tips of the profile's cones are rounded.
+const TIPS: [f64; 2] = [0.0, 0.15];
+/// Distance over which the curvature changes.
+const CHANGE: f64 = 0.4;
+/// Standard deviation of the level, of the tilt's slopes, and of the cones' slopes.
 const LEVEL: f64 = 10.0;
 const TILT: f64 = 0.3;
-const SLOPE: f64 = 0.5;
+const SLOPE: f64 = 0.4;
 /// Standard deviation of a heap's centre about the axis before anything is seen, in radii.
 const OFF_AXIS: f64 = 0.5;
 /// Functions before the knots.
-const FIRST: usize = 4;
+const FIRST: usize = 3 + TIPS.len();
 /// Functions that are not zero at one place, at most.
 const ROW: usize = FIRST + MOST_KNOTS + 16;
 
 /// How much the surface may bend and how irregular it may be.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Roughness {
-    /// Standard deviation of the change of the profile's slope over one radius.
+    /// Standard deviation of the profile's curvature, 1/radius.
     pub bend: f64,
     /// Standard deviation of the smooth rest, in radii.
     pub rest: f64,
@@ -44,12 +49,16 @@ pub struct Roughness {
 pub const RANGES: [f64; 2] = [1.0, 0.45];
 
 /// The functions of a surface about one centre.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone)]
 pub struct Basis {
     /// Centre of the profile, in radii.
     pub centre: [f64; 2],
     knots: usize,
+    curvature: Block,
 }
+
+/// A precision for a standard deviation of 1, and the logarithm of its determinant.
+type Block = (DMatrix<f64>, f64);
 
 /// The functions that are not zero at a place, by increasing index.
 #[derive(Debug, Clone)]
@@ -75,12 +84,13 @@ impl Basis {
     /// The functions of a surface whose profile has its centre at most one radius from the axis.
     pub fn new(centre: [f64; 2]) -> Self {
         let reach = 1.0 + centre[0].hypot(centre[1]);
-        let knots = ((reach / KNOT).ceil() as usize).saturating_sub(1).min(MOST_KNOTS);
-        Self { centre, knots }
+        let knots = ((reach / KNOT).ceil() as usize + 1).min(MOST_KNOTS);
+        let places: Vec<[f64; 2]> = (0..knots).map(|k| [k as f64 * KNOT, 0.0]).collect();
+        Self { centre, knots, curvature: matern_precision(&places, CHANGE) }
     }
 
     /// Number of functions.
-    pub fn len(&self) -> usize {
+    pub fn functions(&self) -> usize {
         FIRST + self.knots + lattice().points.len()
     }
 
@@ -94,6 +104,13 @@ impl Basis {
             }
         });
         row
+    }
+
+    /// Value of a surface at a place.
+    pub fn height(&self, place: [f64; 2], coefficients: &[f64]) -> f64 {
+        let mut sum = 0.0;
+        self.each(place, |index, [value, _, _]| sum += value * coefficients.get(index).copied().unwrap_or(0.0));
+        sum
     }
 
     /// Value of a surface at a place, and its derivatives along u and v.
@@ -118,14 +135,18 @@ impl Basis {
 
     #[inline]
     fn profile(&self, [u, v]: [f64; 2], see: &mut impl FnMut(usize, [f64; 3])) {
-        let rho = (u * u + v * v).sqrt();
-        let slope = if rho > 1e-12 { [u / rho, v / rho] } else { [0.0; 2] };
-        for k in 0..=self.knots {
-            let beyond = rho - k as f64 * KNOT;
-            if beyond <= 0.0 && k > 0 {
-                break;
-            }
-            see(FIRST - 1 + k, [beyond, slope[0], slope[1]]);
+        let square = u * u + v * v;
+        let rho = square.sqrt();
+        for (i, tip) in TIPS.iter().enumerate() {
+            let rounded = (square + tip * tip).sqrt();
+            let slope = if rounded > 1e-12 { [u / rounded, v / rounded] } else { [0.0; 2] };
+            see(3 + i, [rounded - tip, slope[0], slope[1]]);
+        }
+        let along = if rho > 1e-12 { [u / rho, v / rho] } else { [0.0; 2] };
+        for k in 0..self.knots {
+            let Some([value, slope]) = curved(rho / KNOT, k as f64) else { break };
+            let (value, slope) = (value * KNOT * KNOT, slope * KNOT);
+            see(FIRST + k, [value, slope * along[0], slope * along[1]]);
         }
     }
 
@@ -146,23 +167,41 @@ impl Basis {
 
     /// Precision of the coefficients before anything is seen, and the logarithm of its determinant.
     pub fn precision(&self, roughness: Roughness) -> (DMatrix<f64>, f64) {
-        let n = self.len();
+        let n = self.functions();
         let mut q = DMatrix::zeros(n, n);
-        let bend = 1.0 / (roughness.bend * roughness.bend * KNOT);
-        let first = [LEVEL, TILT, TILT, SLOPE].map(|std: f64| 1.0 / (std * std));
-        let diagonal = first.into_iter().chain(std::iter::repeat_n(bend, self.knots));
         let mut log = 0.0;
-        for (i, value) in diagonal.enumerate() {
-            q[(i, i)] = value;
-            log += value.ln();
+        for (i, std) in [LEVEL, TILT, TILT].into_iter().chain(TIPS.map(|_| SLOPE)).enumerate() {
+            q[(i, i)] = 1.0 / (std * std);
+            log -= 2.0 * f64::ln(std);
         }
         let lattice = lattice();
-        let m = lattice.points.len();
-        let scale = 1.0 / (roughness.rest * roughness.rest);
-        let (precision, determinant) = &lattice.precisions[roughness.range.min(RANGES.len() - 1)];
-        q.view_mut((n - m, n - m), (m, m)).copy_from(&(precision * scale));
-        (q, log + determinant + m as f64 * scale.ln())
+        let rest = &lattice.precisions[roughness.range.min(RANGES.len() - 1)];
+        for (first, block, std) in
+            [(FIRST, &self.curvature, roughness.bend), (FIRST + self.knots, rest, roughness.rest)]
+        {
+            let (m, scale) = (block.0.nrows(), 1.0 / (std * std));
+            q.view_mut((first, first), (m, m)).copy_from(&(&block.0 * scale));
+            log += block.1 + m as f64 * scale.ln();
+        }
+        (q, log)
     }
+}
+
+/// Value and slope at x ≥ 0 of the function whose second derivative is a hat of width 1 about `middle`, and which is
+/// level where it begins; None before that.
+fn curved(x: f64, middle: f64) -> Option<[f64; 2]> {
+    let t = x - middle;
+    if t <= -1.0 {
+        return None;
+    }
+    let begun = t + 1.0;
+    let [value, slope] = match t {
+        _ if t >= 1.0 => [t, 1.0],
+        _ if t >= 0.0 => [begun * begun * begun / 6.0 - t * t * t / 3.0, 0.5 * begun * begun - t * t],
+        _ => [begun * begun * begun / 6.0, 0.5 * begun * begun],
+    };
+    // the first hat is cut in two by the centre: what its lost half would add is level and slope there
+    Some(if middle == 0.0 { [value - 1.0 / 6.0 - 0.5 * x, slope - 0.5] } else { [value, slope] })
 }
 
 /// Where the lines of steepest slope meet, in radii, given places and slopes there: least squares over the lines' distances, steep places counting more.
@@ -178,7 +217,7 @@ pub fn meeting_point(slopes: impl Iterator<Item = ([f64; 2], [f64; 2])>) -> Opti
     // a line is known to a tenth of a radius; the prior keeps the centre of a plane at the axis
     a += Matrix2::identity() * (0.01 / (OFF_AXIS * OFF_AXIS) * steepness);
     let centre: Vector2<f64> = a.lu().solve(&b)?;
-    (centre.norm() <= 1.0 && centre.norm() > 0.01).then_some(centre.into())
+    (centre.norm() <= 1.0).then_some(centre.into())
 }
 
 /// The lattice's points near the disc, and for each range the precision of a Matérn field of variance 1 on them with
@@ -186,7 +225,7 @@ pub fn meeting_point(slopes: impl Iterator<Item = ([f64; 2], [f64; 2])>) -> Opti
 struct Lattice {
     points: Vec<[f64; 2]>,
     places: [Option<usize>; SIDE * SIDE],
-    precisions: [(DMatrix<f64>, f64); RANGES.len()],
+    precisions: [Block; RANGES.len()],
 }
 
 impl Lattice {
@@ -214,7 +253,7 @@ fn lattice() -> &'static Lattice {
 }
 
 /// Inverse of `k(d) = (1 + √3 d/range) exp(-√3 d/range)` between the points, and the logarithm of the inverse's determinant.
-fn matern_precision(points: &[[f64; 2]], range: f64) -> (DMatrix<f64>, f64) {
+fn matern_precision(points: &[[f64; 2]], range: f64) -> Block {
     let n = points.len();
     let covariance = DMatrix::from_fn(n, n, |i, j| {
         let (a, b) = (points[i], points[j]);
@@ -230,19 +269,14 @@ fn matern_precision(points: &[[f64; 2]], range: f64) -> (DMatrix<f64>, f64) {
 /// Lattice interval of a coordinate and the place in it; outside [-1, 1] the edge's polynomial goes on.
 fn cell(u: f64) -> (usize, f64) {
     let s = (u + 1.0) / PITCH;
-    let i = s.clamp(0.0, (SIDE - 4) as f64).floor();
-    (i as usize, s - i)
+    let i = s.clamp(0.0, (SIDE - 4) as f64) as usize;
+    (i, s - i as f64)
 }
 
 /// Weights of the uniform cubic B-spline.
 fn spline(t: f64) -> [f64; 4] {
     let s = 1.0 - t;
-    [
-        s * s * s / 6.0,
-        (t * t * (3.0 * t - 6.0) + 4.0) / 6.0,
-        (s * s * (3.0 * s - 6.0) + 4.0) / 6.0,
-        t * t * t / 6.0,
-    ]
+    [s * s * s / 6.0, (t * t * (3.0 * t - 6.0) + 4.0) / 6.0, (s * s * (3.0 * s - 6.0) + 4.0) / 6.0, t * t * t / 6.0]
 }
 
 fn spline_slope(t: f64) -> [f64; 4] {
@@ -251,6 +285,7 @@ fn spline_slope(t: f64) -> [f64; 4] {
 }
 
 #[cfg(test)]
+#[allow(clippy::panic)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
@@ -259,7 +294,7 @@ mod tests {
         #[test]
         fn slopes_are_the_derivatives(u in -0.9f64..0.9, v in -0.9f64..0.9, seed in 0u64..1000) {
             let basis = Basis::new([0.21, -0.4]);
-            let c: Vec<f64> = (0..basis.len()).map(|i| ((seed + 1) as f64 * (i as f64 + 0.7)).sin()).collect();
+            let c: Vec<f64> = (0..basis.functions()).map(|i| ((seed + 1) as f64 * (i as f64 + 0.7)).sin()).collect();
             let rho = (u - 0.21).hypot(v + 0.4);
             prop_assume!((rho / KNOT - (rho / KNOT).round()).abs() > 1e-3);
             let at = |u, v| basis.row([u, v]).dot(&c);
@@ -283,7 +318,7 @@ mod tests {
     fn the_precision_has_the_determinant_it_says() {
         let basis = Basis::new([0.0, 0.0]);
         let (q, log) = basis.precision(Roughness { bend: 0.4, rest: 0.03, range: 1 });
-        assert_eq!(q.nrows(), basis.len());
+        assert_eq!(q.nrows(), basis.functions());
         let Some(factor) = q.cholesky() else { panic!("positive definite") };
         assert!((factor.ln_determinant() - log).abs() < 1e-6 * log.abs());
     }
@@ -291,7 +326,20 @@ mod tests {
     #[test]
     fn the_row_has_room_for_a_heap_at_the_wall() {
         let basis = Basis::new([1.0, 0.0]);
-        assert_eq!(basis.knots, 19);
-        assert!(basis.row([-0.99, 0.0]).len < ROW);
+        let c: Vec<f64> = (0..basis.functions()).map(|i| (i as f64 + 0.3).cos()).collect();
+        let place = [-0.99, 0.1];
+        assert!((basis.row(place).dot(&c) - basis.jet(place, &c)[0]).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_profile_bends_as_its_hats_say() {
+        let h = 1e-4;
+        for (middle, x) in [(0.0, 0.4), (0.0, 1.3), (3.0, 2.3), (3.0, 3.6), (3.0, 5.5)] {
+            let at = |x: f64| curved(x, middle).map_or([0.0; 2], |jet| jet);
+            let hat = (1.0 - (x - middle).abs()).max(0.0);
+            assert!(((at(x + h)[1] - at(x - h)[1]) / (2.0 * h) - hat).abs() < 1e-6);
+            assert!(((at(x + h)[0] - at(x - h)[0]) / (2.0 * h) - at(x)[1]).abs() < 1e-6);
+        }
+        assert_eq!(curved(0.0, 0.0), Some([0.0, 0.0]));
     }
 }

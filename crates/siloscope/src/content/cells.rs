@@ -31,6 +31,10 @@ pub struct Bound {
 /// Step of the margins' table, metres.
 const STEP: f32 = 0.02;
 
+/// 2²³: a number of single precision that is added to it is rounded to whole numbers, which stand in its lowest bits.
+/// Conversions would do the same, but not for four returns at a time.
+const WHOLE: f32 = 8_388_608.0;
+
 /// On which side of the wall a return lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Side {
@@ -51,13 +55,13 @@ impl Places {
         self.cell.resize(line.len(), 0);
         self.square.resize(line.len(), 0.0);
         let scale = 1.0 / grid.cell() as f32;
-        let [ox, oy] = grid.centre.map(|c| (grid.reach - c) as f32 * scale);
-        let (side, last) = (grid.side as i32, (grid.side - 1) as f32);
+        let [ox, oy] = grid.centre.map(|c| (grid.reach - c) as f32 * scale - 0.5);
+        let (side, last) = (grid.side as f32, (grid.side - 1) as f32);
+        let whole = |place: f32| (place.max(0.0).min(last) + WHOLE) - WHOLE;
         let out = self.cell.iter_mut().zip(&mut self.square);
         for ((cell, square), (&x, &y)) in out.zip(line.x.iter().zip(&line.y)) {
-            let column = (x * scale + ox).clamp(0.0, last) as i32;
-            let row = (y * scale + oy).clamp(0.0, last) as i32;
-            *cell = (row * side + column) as u32;
+            let index = whole(y * scale + oy) * side + whole(x * scale + ox);
+            *cell = (index + WHOLE).to_bits() & (WHOLE as u32 - 1);
             *square = x * x + y * y;
         }
     }
@@ -97,7 +101,8 @@ impl Bound {
         let along = (x * (x - self.camera[0]) + y * (y - self.camera[1])).abs() / depth;
         let margin = by_depth * along + by_radius;
         let excess = x * x + y * y - self.radius * self.radius;
-        if z < self.top || !(excess <= margin) {
+        let beyond = excess > margin || excess.is_nan();
+        if z < self.top || beyond {
             Side::Outside
         } else if excess > -margin {
             Side::Wall
@@ -180,7 +185,7 @@ pub fn gather(
     let mut sums = Gathering {
         bound,
         windows: survey(returns, bound, grid, noise),
-        cells: vec![Cell::default(); grid.len()],
+        cells: vec![Cell::default(); grid.count()],
         tally: Tally::default(),
         run: Run::default(),
         floating: f32::INFINITY,
@@ -290,7 +295,7 @@ fn survey(returns: &Returns<'_>, bound: &Bound, grid: &Grid, noise: &NoiseLaw) -
         }
     });
     samples.sort_unstable_by_key(|s| s.0);
-    let mut windows = vec![CLOSED; grid.len()];
+    let mut windows = vec![CLOSED; grid.count()];
     for group in samples.chunk_by_mut(|a, b| a.0 == b.0) {
         if let Some(window) = group.first().and_then(|s| windows.get_mut(s.0 as usize)) {
             *window = self::window(group, noise);

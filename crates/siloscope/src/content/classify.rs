@@ -11,6 +11,8 @@ use super::volume::Kind;
 const SIGMAS: f64 = 4.0;
 /// A cell is clear of the rim where the content under its middle is thicker than this many cells times its rise.
 const CLEAR: f64 = 0.75;
+/// Content thicker than this many cells is clear of the rim however it slopes.
+const THICK: f64 = 4.0;
 /// Steepest climb between neighbouring cells of one surface: tan 65°; feed at rest never lies so steep.
 const STEEPEST: f64 = 2.1;
 
@@ -25,6 +27,8 @@ pub struct Classified {
     pub things: Vec<Thing>,
     /// Steep holes: parts of the surface that lie far below the rest, by size.
     pub holes: Vec<Thing>,
+    /// Share of the seen cells that lie surely below the floor.
+    pub sunken: f64,
 }
 
 /// Neighbouring cells that steep steps part from the surface.
@@ -52,12 +56,12 @@ pub struct Floor<'a> {
 }
 
 impl Floor<'_> {
-    /// Whether a cell's mean lies surely above the floor.
-    fn covered(&self, cell: &Cell, grid: &Grid) -> bool {
+    /// How far a cell's mean lies above the floor, in standard deviations.
+    fn sigmas_above(&self, cell: &Cell, grid: &Grid) -> f64 {
         let thickness = self.vessel.floor(mean_radius(cell.mean, grid.cell())) - cell.mean[2];
         let known = deviation(&self.lever.thickness(cell.mean, self.vessel), self.covariance);
         let noise = cell.variance + self.wall_std * self.wall_std;
-        thickness > SIGMAS * (known * known + noise).sqrt()
+        thickness / (known * known + noise).sqrt()
     }
 }
 
@@ -71,7 +75,9 @@ fn mean_radius([x, y, _]: [f64; 3], cell: f64) -> f64 {
 
 /// Sorts the cells and fits the surface.
 pub fn classify(grid: &Grid, cells: &[Cell], floor: &Floor<'_>) -> Classified {
-    let covered: Vec<bool> = cells.iter().map(|c| c.seen() && floor.covered(c, grid)).collect();
+    let sigmas = |c: &Cell| if c.seen() { floor.sigmas_above(c, grid) } else { 0.0 };
+    let above: Vec<f64> = cells.iter().map(sigmas).collect();
+    let covered: Vec<bool> = above.iter().map(|&sigmas| sigmas > SIGMAS).collect();
     let main = main_part(grid, cells, &covered);
     let (mut things, mut holes) = (Vec::new(), Vec::new());
     let mut surface = None;
@@ -82,16 +88,21 @@ pub fn classify(grid: &Grid, cells: &[Cell], floor: &Floor<'_>) -> Classified {
         for (take, cell) in take.iter_mut().zip(cells) {
             *take = *take && clear_of_rim(&sketch, floor.vessel, cell);
         }
-        surface = fit(&sketch, cells, &take).or(Some(sketch));
+        surface = fit(&sketch, cells, &take).or_else(|| fit(&sketch, cells, &main));
     }
     let kinds = kinds(grid, cells, &covered, &things);
-    Classified { kinds, surface, things, holes }
+    let seen = cells.iter().filter(|c| c.seen()).count().max(1) as f64;
+    let sunken = above.iter().filter(|&&sigmas| sigmas < -SIGMAS).count() as f64 / seen;
+    Classified { kinds, surface, things, holes, sunken }
 }
 
 /// Whether the content's rim stays out of a cell.
 fn clear_of_rim(surface: &Surface, vessel: &Vessel, cell: &Cell) -> bool {
-    let [x, y, _] = cell.mean;
-    let r = x.hypot(y).max(1e-9);
+    let [x, y, seen] = cell.mean;
+    let r = (x * x + y * y).sqrt().max(1e-9);
+    if vessel.floor(r) - seen > THICK * surface.grid.cell() {
+        return true;
+    }
     let [z, zx, zy] = surface.trend_at(x, y);
     let fall = -vessel.cone_height() / vessel.radius / r;
     let rise = (fall * x - zx).hypot(fall * y - zy);
@@ -115,10 +126,10 @@ fn kinds(grid: &Grid, cells: &[Cell], covered: &[bool], things: &[Thing]) -> Vec
 
 /// Labels of the parts into which steep steps divide the covered cells; 0 for cells that are not covered.
 fn parts(grid: &Grid, cells: &[Cell], covered: &[bool]) -> (Vec<usize>, Vec<usize>) {
-    let mut labels = vec![0; grid.len()];
+    let mut labels = vec![0; grid.count()];
     let mut sizes = vec![0];
     let mut stack = Vec::new();
-    for seed in 0..grid.len() {
+    for seed in 0..grid.count() {
         if !covered[seed] || labels[seed] != 0 {
             continue;
         }
@@ -164,7 +175,7 @@ fn parted(
 ) -> (Vec<Thing>, Vec<Thing>) {
     let (labels, sizes) = parts(grid, cells, covered);
     let mut found: Vec<Thing> = vec![Thing { cells: Vec::new(), above: 0.0, at_wall: false }; sizes.len()];
-    for i in (0..grid.len()).filter(|&i| covered[i] && !main[i]) {
+    for i in (0..grid.count()).filter(|&i| covered[i] && !main[i]) {
         let [x, y, z] = cells[i].mean;
         let thing = &mut found[labels[i]];
         thing.cells.push(i);

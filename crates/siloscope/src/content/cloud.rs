@@ -58,7 +58,7 @@ impl Relief {
         }
         let seen: Vec<bool> = cells.iter().map(Cell::seen).collect();
         let kinds = seen.iter().map(|&s| if s { Kind::Feed } else { Kind::Unseen }).collect();
-        let surface = sketch(&grid, &cells, &seen).and_then(|sketch| fit(&sketch, &cells, &seen).or(Some(sketch)));
+        let surface = sketch(&grid, &cells, &seen).and_then(|sketch| fit(&sketch, &cells, &seen));
         Ok(surface.map(|surface| Self { grid, cells, kinds, surface, ceiling, axes }))
     }
 
@@ -109,6 +109,7 @@ fn axes(up: &Vec3) -> Result<Matrix3<f64>> {
 }
 
 #[cfg(test)]
+#[allow(clippy::panic)]
 mod tests {
     use super::*;
 

@@ -11,18 +11,18 @@ const OVER: f64 = 1.5;
 /// Extends the known deviations by the screened Laplace equation `(4 + 1/reach²) d = Σ neighbours`.
 pub fn fill(grid: &Grid, known: &[Option<f64>]) -> Vec<f64> {
     let mut d: Vec<f64> = known.iter().map(|k| k.unwrap_or(0.0)).collect();
-    let free: Vec<usize> = (0..grid.len()).filter(|&i| known[i].is_none()).collect();
+    let free: Vec<usize> = (0..grid.count()).filter(|&i| known[i].is_none()).collect();
     relax(grid, &free, &mut d, |_| 0.0);
     d
 }
 
 /// How much each known deviation weighs in `Σ weights · fill(known)`: the transpose of `fill`.
 pub fn gather(grid: &Grid, known: &[bool], weights: &[f64]) -> Vec<f64> {
-    let free: Vec<usize> = (0..grid.len()).filter(|&i| !known[i]).collect();
-    let mut carried = vec![0.0; grid.len()];
+    let free: Vec<usize> = (0..grid.count()).filter(|&i| !known[i]).collect();
+    let mut carried = vec![0.0; grid.count()];
     relax(grid, &free, &mut carried, |i| weights[i]);
     let own = |i: usize| weights[i] + grid.beside(i).filter(|&j| !known[j]).map(|j| carried[j]).sum::<f64>();
-    (0..grid.len()).map(|i| if known[i] { own(i) } else { 0.0 }).collect()
+    (0..grid.count()).map(|i| if known[i] { own(i) } else { 0.0 }).collect()
 }
 
 /// Sweeps of successive over-relaxation, forwards and backwards in turn, over the free cells.
@@ -65,7 +65,7 @@ mod tests {
 
     #[test]
     fn a_deviation_dies_away_from_where_it_is_known() {
-        let known: Vec<_> = (0..GRID.len()).map(|i| (i % 16 < 4).then_some(0.05)).collect();
+        let known: Vec<_> = (0..GRID.count()).map(|i| (i % 16 < 4).then_some(0.05)).collect();
         let filled = fill(&GRID, &known);
         let row: Vec<f64> = (0..16).map(|i| filled[8 * 16 + i]).collect();
         assert!(row.windows(2).all(|w| w[1] <= w[0] + 1e-12), "{row:?}");
@@ -74,9 +74,9 @@ mod tests {
 
     #[test]
     fn gathering_is_the_transpose_of_filling() {
-        let known: Vec<bool> = (0..GRID.len()).map(|i| (i * 7) % 5 < 2 || i % 16 < 3).collect();
-        let weights: Vec<f64> = (0..GRID.len()).map(|i| (i as f64).sin()).collect();
-        let values: Vec<f64> = (0..GRID.len()).map(|i| (i as f64 * 0.3).cos()).collect();
+        let known: Vec<bool> = (0..GRID.count()).map(|i| (i * 7) % 5 < 2 || i % 16 < 3).collect();
+        let weights: Vec<f64> = (0..GRID.count()).map(|i| (i as f64).sin()).collect();
+        let values: Vec<f64> = (0..GRID.count()).map(|i| (i as f64 * 0.3).cos()).collect();
         let filled = fill(&GRID, &known.iter().zip(&values).map(|(k, v)| k.then_some(*v)).collect::<Vec<_>>());
         let forwards: f64 = filled.iter().zip(&weights).map(|(d, w)| d * w).sum();
         let back: f64 = gather(&GRID, &known, &weights).iter().zip(&values).map(|(g, v)| g * v).sum();
@@ -85,7 +85,8 @@ mod tests {
 
     #[test]
     fn between_middles_it_is_bilinear() {
-        let values: Vec<f64> = (0..GRID.len()).map(|i| GRID.middle(i)).map(|[x, y]| 1.0 + 2.0 * x - 3.0 * y).collect();
+        let values: Vec<f64> =
+            (0..GRID.count()).map(|i| GRID.middle(i)).map(|[x, y]| 1.0 + 2.0 * x - 3.0 * y).collect();
         for (x, y) in [(0.1, -0.2), (0.73, 0.41), (-0.6, -0.9)] {
             assert!((between(&GRID, &values, x, y) - (1.0 + 2.0 * x - 3.0 * y)).abs() < 1e-12);
         }

@@ -9,17 +9,21 @@ use super::trend::{Observation, Sums, Trend, variance};
 /// A residual beyond so many robust standard deviations counts less, the more so the farther it is.
 const HUBER: f64 = 2.5;
 /// Rounds of reweighting.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 2;
 /// Roughness of the first, loose fit.
 const LOOSE: Roughness = Roughness { bend: 1.0, rest: 0.1, range: 0 };
 /// Values tried for the roughness, from which the evidence chooses.
-const BENDS: [f64; 5] = [0.05, 0.1, 0.2, 0.5, 1.2];
+const BENDS: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
 const RESTS: [f64; 6] = [0.002, 0.005, 0.012, 0.03, 0.07, 0.16];
 /// Roughness under which two centres are compared, and how much more probable the cells must be about the new one.
 const TRIED: Roughness = Roughness { bend: 0.5, rest: 0.012, range: 0 };
 const GAIN: f64 = 3.0;
+/// A centre nearer to the axis than this, in radii, is the axis.
+const OFF_AXIS: f64 = 0.03;
 /// Smallest standard deviation of a cell's height, metres: what rounding and a cell's own curvature leave.
 const SMALLEST: f64 = 5e-4;
+/// Of more cells than these a sketch takes every other one.
+const PLENTY: usize = 200;
 /// Fewest cells that make a surface.
 const FEWEST: usize = 3;
 
@@ -44,6 +48,8 @@ pub struct Surface {
     pub kept: Vec<f64>,
     /// The observations that the trend was made of, with their cells.
     pub used: Vec<(usize, Observation)>,
+    /// Slopes dz/dx and dz/dy of the trend there; none for a sketch.
+    pub slopes: Vec<[f64; 2]>,
 }
 
 impl Surface {
@@ -61,7 +67,10 @@ impl Surface {
     /// Heights of the trend at the cells' mean points, in its units about the mean of those cells.
     fn heights(&self, taken: &[usize], cells: &[Cell]) -> Vec<f64> {
         let mean = taken.iter().map(|&i| cells[i].mean[2]).sum::<f64>() / taken.len().max(1) as f64;
-        let at = |&i: &usize| (self.trend_at(cells[i].mean[0], cells[i].mean[1])[0] - mean) / self.grid.reach;
+        let at = |&i: &usize| {
+            let z = self.basis.height(unit(&self.grid, cells[i].mean), self.trend.coefficients.as_slice());
+            z + (self.datum - mean) / self.grid.reach
+        };
         taken.iter().map(at).collect()
     }
 
@@ -80,7 +89,7 @@ impl Surface {
             let detail = if kept > 0.0 { kept * cells[i].variance } else { self.roughness.powi(2) };
             ((1.0 - kept).powi(2) * trend + detail).sqrt()
         };
-        (0..self.grid.len()).map(deviation).collect()
+        (0..self.grid.count()).map(deviation).collect()
     }
 
     /// Share of a cell's deviation from the trend that is taken for the surface's own.
@@ -96,9 +105,11 @@ fn unit(grid: &Grid, [x, y, _]: [f64; 3]) -> [f64; 2] {
 
 /// A first surface: a loose fit, to tell what lies on it.
 pub fn sketch(grid: &Grid, cells: &[Cell], take: &[bool]) -> Option<Surface> {
-    let mut work = Work::new(grid, cells, take)?;
+    let some: Vec<bool> = (0..take.len()).map(|i| take[i] && (i + i / grid.side).is_multiple_of(2)).collect();
+    let enough = take.iter().filter(|&&t| t).count() > PLENTY;
+    let mut work = Work::new(grid, cells, if enough { &some } else { take })?;
     let trend = work.robust(LOOSE)?;
-    Some(work.finish(trend, 1.0))
+    Some(work.finish(trend, 1.0, Vec::new()))
 }
 
 /// Fits the surface to the cells that `take` names, given a first one; None where they are too few.
@@ -107,11 +118,13 @@ pub fn fit(sketch: &Surface, cells: &[Cell], take: &[bool]) -> Option<Surface> {
     work.settle(&sketch.heights(&work.cells, cells));
     let sums = work.centre(cells, sketch);
     let (roughness, trend) = most_probable(&sums, &work.basis)?;
-    work.unbend(cells, &trend);
+    let heights = work.heights(&trend);
+    work.unbend(&heights);
+    let slopes = work.slopes(&heights);
     let patch = work.patch(&trend);
     work.widen(patch);
-    let trend = Sums::new(work.basis.len(), &work.observations).solve(&work.basis, roughness)?;
-    Some(work.finish(trend, patch))
+    let trend = Sums::new(work.basis.functions(), &work.observations).solve(&work.basis, roughness)?;
+    Some(work.finish(trend, patch, slopes))
 }
 
 /// The observations on their way to a surface. Heights in units of the grid's reach.
@@ -155,10 +168,10 @@ impl<'a> Work<'a> {
 
     /// Reweighted least squares: cells off the surface lose their say.
     fn robust(&mut self, roughness: Roughness) -> Option<Trend> {
-        let mut trend = Sums::new(self.basis.len(), &self.observations).solve(&self.basis, roughness)?;
+        let mut trend = Sums::new(self.basis.functions(), &self.observations).solve(&self.basis, roughness)?;
         for _ in 1..ROUNDS {
             self.settle(&self.fitted(&trend));
-            trend = Sums::new(self.basis.len(), &self.observations).solve(&self.basis, roughness)?;
+            trend = Sums::new(self.basis.functions(), &self.observations).solve(&self.basis, roughness)?;
         }
         Some(trend)
     }
@@ -178,11 +191,13 @@ impl<'a> Work<'a> {
 
     /// Puts the profile's centre where the slopes meet, if the cells are then more probable than about the axis.
     fn centre(&mut self, cells: &[Cell], sketch: &Surface) -> Sums {
-        let sums = |basis: &Basis, observations: &[Observation]| Sums::new(basis.len(), observations);
+        let sums = |basis: &Basis, observations: &[Observation]| Sums::new(basis.functions(), observations);
         let about_axis = sums(&self.basis, &self.observations);
         let place = |i: &usize| unit(self.grid, cells[*i].mean);
-        let slopes = self.cells.iter().map(place).map(|at| (at, sketch.trend.slopes(&sketch.basis, at)));
-        let Some(centre) = meeting_point(slopes) else { return about_axis };
+        let few = self.cells.iter().step_by(self.cells.len() / PLENTY + 1).map(place);
+        let slopes = few.map(|at| (at, sketch.trend.slopes(&sketch.basis, at)));
+        let off_axis = |c: &[f64; 2]| c[0].hypot(c[1]) > OFF_AXIS;
+        let Some(centre) = meeting_point(slopes).filter(off_axis) else { return about_axis };
         let basis = Basis::new(centre);
         let moved: Vec<Observation> = (self.cells.iter().zip(&self.observations))
             .map(|(i, o)| Observation { row: basis.row(place(i)), ..*o })
@@ -196,15 +211,39 @@ impl<'a> Work<'a> {
         about_centre
     }
 
-    /// Takes from each cell's mean height what the surface's own bend over the cell adds to it.
-    fn unbend(&mut self, cells: &[Cell], trend: &Trend) {
-        let half = 1.0 / (3f64.sqrt() * self.grid.side as f64); // standard deviation of a cell's places, in radii
+    /// Takes from each cell's mean height what the surface's own bend over the cell adds to it: `cell² ∇²z / 24`.
+    fn unbend(&mut self, heights: &[f64]) {
+        let grid = self.grid;
         for (o, &i) in self.observations.iter_mut().zip(&self.cells) {
-            let [u, v] = unit(self.grid, cells[i].mean);
-            let at = |u: f64, v: f64| trend.height(&self.basis.row([u, v]));
-            let sides = at(u + half, v) + at(u - half, v) + at(u, v + half) + at(u, v - half);
-            o.value -= 0.5 * (sides - 4.0 * at(u, v));
+            let (sum, beside) = grid.beside(i).fold((0.0, 0.0), |(sum, n), j| (sum + heights[j], n + 1.0));
+            if beside == 4.0 {
+                o.value -= (sum - 4.0 * heights[i]) / 24.0;
+            }
         }
+    }
+
+    /// Heights of a trend at the middles of all cells.
+    fn heights(&self, trend: &Trend) -> Vec<f64> {
+        let place = |i: usize| self.grid.middle(i);
+        let height = |[x, y]: [f64; 2]| self.basis.height(unit(self.grid, [x, y, 0.0]), trend.coefficients.as_slice());
+        (0..self.grid.count()).map(place).map(height).collect()
+    }
+
+    /// Slopes dz/dx and dz/dy at the used cells, from the heights of their neighbours.
+    fn slopes(&self, heights: &[f64]) -> Vec<[f64; 2]> {
+        let (side, step) = (self.grid.side, 2.0 / self.grid.side as f64);
+        let rise = |i: usize, below: Option<usize>, above: Option<usize>| {
+            let (from, to) = (below.unwrap_or(i), above.unwrap_or(i));
+            let steps = f64::from(u8::from(below.is_some()) + u8::from(above.is_some()));
+            (heights[to] - heights[from]) / (steps.max(1.0) * step)
+        };
+        let slope = |&i: &usize| {
+            let (column, row) = (i % side, i / side);
+            let along_x = rise(i, (column > 0).then(|| i - 1), (column + 1 < side).then_some(i + 1));
+            let along_y = rise(i, (row > 0).then(|| i - side), (row + 1 < side).then_some(i + side));
+            [along_x, along_y]
+        };
+        self.cells.iter().map(slope).collect()
     }
 
     /// Deviations that keep together over a patch of cells count once, not once a cell.
@@ -218,7 +257,7 @@ impl<'a> Work<'a> {
     fn patch(&self, trend: &Trend) -> f64 {
         let residuals = self.residuals(&self.fitted(trend));
         let limit = HUBER * scatter(&residuals);
-        let mut at = vec![f64::NAN; self.grid.len()];
+        let mut at = vec![f64::NAN; self.grid.count()];
         for (&i, r) in self.cells.iter().zip(&residuals) {
             at[i] = r.clamp(-limit, limit);
         }
@@ -237,16 +276,16 @@ impl<'a> Work<'a> {
         ((1.0 + correlation) / (1.0 - correlation)).powi(2)
     }
 
-    fn finish(self, trend: Trend, patch: f64) -> Surface {
+    fn finish(self, trend: Trend, patch: f64, slopes: Vec<[f64; 2]>) -> Surface {
         let residuals = self.residuals(&self.fitted(&trend));
         let reach = self.grid.reach;
-        let mut known = vec![None; self.grid.len()];
-        let mut kept = vec![0.0; self.grid.len()];
+        let mut known = vec![None; self.grid.count()];
+        let mut kept = vec![0.0; self.grid.count()];
         for ((&i, residual), noise) in self.cells.iter().zip(&residuals).zip(&self.noise) {
             kept[i] = self.rough / (self.rough + noise);
             known[i] = Some(kept[i] * residual * reach);
         }
-        let detail = if self.rough > 0.0 { detail::fill(self.grid, &known) } else { vec![0.0; self.grid.len()] };
+        let detail = if self.rough > 0.0 { detail::fill(self.grid, &known) } else { vec![0.0; self.grid.count()] };
         Surface {
             grid: *self.grid,
             basis: self.basis,
@@ -256,6 +295,7 @@ impl<'a> Work<'a> {
             roughness: self.rough.sqrt() * reach,
             patch,
             kept,
+            slopes,
             used: self.cells.into_iter().zip(self.observations).collect(),
         }
     }
@@ -263,19 +303,20 @@ impl<'a> Work<'a> {
 
 /// The trend of the roughness under which the cells are most probable, found by climbing.
 fn most_probable(sums: &Sums, basis: &Basis) -> Option<(Roughness, Trend)> {
-    let mut at = Steps { bend: 2, rest: 2, range: 0 };
+    let mut at = Steps { bend: 2, rest: 1, range: 0 };
     let mut best = sums.solve(basis, at.roughness())?;
-    loop {
-        let tried = at.around().filter_map(|next| Some((sums.solve(basis, next.roughness())?, next)));
-        match tried.max_by(|x, y| x.0.evidence.total_cmp(&y.0.evidence)) {
-            Some((trend, next)) if trend.evidence > best.evidence + 0.1 => (best, at) = (trend, next),
-            _ => return Some((at.roughness(), best)),
+    let mut tried = vec![at];
+    while let Some(next) = at.around().find(|next| !tried.contains(next)) {
+        tried.push(next);
+        if let Some(trend) = sums.solve(basis, next.roughness()).filter(|t| t.evidence > best.evidence) {
+            (best, at) = (trend, next);
         }
     }
+    Some((at.roughness(), best))
 }
 
 /// A place in the lists of values tried for the roughness.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 struct Steps {
     bend: usize,
     rest: usize,
@@ -291,10 +332,10 @@ impl Steps {
     fn around(self) -> impl Iterator<Item = Self> {
         let Self { bend, rest, range } = self;
         let steps = [
+            Self { rest: rest.wrapping_sub(1), ..self },
+            Self { rest: rest + 1, ..self },
             Self { bend: bend + 1, ..self },
             Self { bend: bend.wrapping_sub(1), ..self },
-            Self { rest: rest + 1, ..self },
-            Self { rest: rest.wrapping_sub(1), ..self },
             Self { range: range + 1, ..self },
             Self { range: range.wrapping_sub(1), ..self },
         ];

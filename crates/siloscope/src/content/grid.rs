@@ -12,7 +12,7 @@ pub struct Grid {
 }
 
 /// Fewest and most cells along a side.
-const SIDES: (usize, usize) = (12, 36);
+const SIDES: (usize, usize) = (12, 32);
 /// Returns wanted in a cell.
 const WANTED: f64 = 40.0;
 
@@ -25,7 +25,7 @@ impl Grid {
     }
 
     /// Number of cells.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.side * self.side
     }
 
@@ -82,7 +82,7 @@ mod tests {
     #[test]
     fn a_cell_holds_its_middle_and_has_its_neighbours() {
         let grid = Grid { centre: [0.3, -0.2], reach: 1.5, side: 7 };
-        for i in 0..grid.len() {
+        for i in 0..grid.count() {
             let [x, y] = grid.middle(i);
             assert_eq!(grid.index(x, y), Some(i));
             assert!(grid.beside(i).all(|j| grid.around(i).any(|k| k == j)));

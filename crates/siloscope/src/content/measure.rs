@@ -78,6 +78,10 @@ pub struct Content {
     pub holes: Vec<Thing>,
     /// The surface's shape, from the cells that show it.
     pub shape: Option<Shape>,
+    /// Distances from the axis of the nearest and the farthest cell that shows the bare floor.
+    pub bare: Option<[f64; 2]>,
+    /// Share of the seen cells that lie surely below the floor.
+    pub sunken: f64,
     /// Counts of the frame.
     pub tally: Tally,
     /// How much the sensor sees.
@@ -93,9 +97,8 @@ pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
     let grid = Grid::over_disc([0.0, 0.0], setup.vessel.radius, returns.len());
     let lever = Lever::new(&setup.pose);
     let (cells, tally) = gather(&returns, &bound(setup), &grid, &setup.noise, &lever);
-    let floor =
-        Floor { vessel: &setup.vessel, lever: &lever, covariance: &setup.covariance, wall_std: setup.wall_std };
-    let Classified { kinds, surface, things, holes } = classify(&grid, &cells, &floor);
+    let floor = Floor { vessel: &setup.vessel, lever: &lever, covariance: &setup.covariance, wall_std: setup.wall_std };
+    let Classified { kinds, surface, things, holes, sunken } = classify(&grid, &cells, &floor);
     let volume = surface.as_ref().map(|s| integrate(s, &setup.vessel, &kinds));
     let (doubts, derivatives) = match (&surface, &volume) {
         (Some(surface), Some(volume)) => doubts(surface, volume, &cells, &lever, &setup.covariance),
@@ -103,20 +106,45 @@ pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
     };
     let shape = surface.as_ref().and_then(|s| shape_of(s, &cells, setup.vessel.radius));
     let sight = sight(source, &returns, &setup.vessel, &setup.pose, setup.range);
-    let shift = shift(&returns, &setup.vessel, &lever, &setup.noise, &setup.covariance);
-    Ok(Content { grid, cells, kinds, surface, volume, doubts, derivatives, things, holes, shape, tally, sight, shift })
+    let shift = shift(&returns, &setup.vessel, &lever, &setup.noise, &setup.covariance, surface.as_ref());
+    let bare = bare_floor(&grid, &kinds);
+    Ok(Content {
+        grid,
+        cells,
+        kinds,
+        surface,
+        volume,
+        doubts,
+        derivatives,
+        things,
+        holes,
+        shape,
+        bare,
+        sunken,
+        tally,
+        sight,
+        shift,
+    })
 }
 
 /// Shape of the seen part of a surface; heights upwards.
 pub fn shape_of(surface: &Surface, cells: &[Cell], reach: f64) -> Option<Shape> {
-    let sample = |(i, _): &(usize, Observation)| {
+    let sample = |((i, o), [zx, zy]): (&(usize, Observation), &[f64; 2])| {
         let [x, y, _] = cells[*i].mean;
-        let [z, zx, zy] = surface.trend_at(x, y);
+        let z = surface.datum + surface.trend.height(&o.row) * surface.grid.reach;
         let detail = detail::between(&surface.grid, &surface.detail, x, y);
         Sample { place: [x, y], height: -(z + detail), slope: [-zx, -zy] }
     };
-    let samples: Vec<Sample> = surface.used.iter().map(sample).collect();
+    let samples: Vec<Sample> = surface.used.iter().zip(&surface.slopes).map(sample).collect();
     shape(&samples, surface.grid.centre, reach)
+}
+
+fn bare_floor(grid: &Grid, kinds: &[Kind]) -> Option<[f64; 2]> {
+    let bare = (0..grid.count()).filter(|&i| matches!(kinds[i], Kind::Bare | Kind::Rim));
+    bare.map(|i| grid.middle(i)).map(|[x, y]| x.hypot(y)).fold(None, |found, r| match found {
+        None => Some([r, r]),
+        Some([near, far]) => Some([f64::min(near, r), f64::max(far, r)]),
+    })
 }
 
 /// The cylinder with the variance of a point's distance to it.
@@ -134,7 +162,7 @@ fn bound(setup: &Setup) -> Bound {
 fn influences(surface: &Surface, volume: &Volume) -> (Vec<f64>, DVector<f64>) {
     let reach = surface.grid.reach;
     let rough = (surface.roughness / reach).powi(2);
-    let mut known = vec![false; surface.grid.len()];
+    let mut known = vec![false; surface.grid.count()];
     surface.used.iter().for_each(|(i, _)| known[*i] = true);
     let own = if rough > 0.0 { detail::gather(&surface.grid, &known, &volume.cells) } else { vec![0.0; known.len()] };
     let mut left = volume.functions.clone();
@@ -145,9 +173,8 @@ fn influences(surface: &Surface, volume: &Volume) -> (Vec<f64>, DVector<f64>) {
         kept.push(weight);
     }
     let spread = surface.trend.spread(&left);
-    let through = |o: &Observation| {
-        o.row.iter().map(|(j, value)| spread[j] * value).sum::<f64>() / (o.variance * reach)
-    };
+    let through =
+        |o: &Observation| o.row.iter().map(|(j, value)| spread[j] * value).sum::<f64>() / (o.variance * reach);
     let all = surface.used.iter().zip(kept).map(|((_, o), weight)| weight + through(o)).collect();
     (all, left)
 }
@@ -162,10 +189,9 @@ fn doubts(
     let (influences, left) = influences(surface, volume);
     let mut derivatives = Parameters::zeros();
     let mut noise = 0.0;
-    for ((i, _), influence) in surface.used.iter().zip(influences) {
+    for (((i, _), slopes), influence) in surface.used.iter().zip(&surface.slopes).zip(influences) {
         let cell = &cells[*i];
-        let [_, zx, zy] = surface.trend_at(cell.mean[0], cell.mean[1]);
-        derivatives -= influence * lever.heights(cell.mean, [zx, zy]);
+        derivatives -= influence * lever.heights(cell.mean, *slopes);
         noise += influence * influence * cell.variance;
     }
     derivatives[4] += volume.geometry.radius;
@@ -189,4 +215,4 @@ fn doubts(
 }
 
 /// Mean height error that the grid leaves, metres.
-const GRID_ERROR: f64 = 2e-4;
+const GRID_ERROR: f64 = 1e-4;

@@ -187,6 +187,7 @@ fn load_points<'p>(line: &mut Line, points: impl Iterator<Item = &'p [f32; 3]>) 
 }
 
 #[cfg(test)]
+#[allow(clippy::panic)]
 mod tests {
     use super::*;
     use crate::Vec3;
@@ -218,8 +219,7 @@ mod tests {
     fn pinholes_rays_and_points_agree() {
         let (columns, rows) = ([-0.2f32, 0.0, 0.3], [0.1f32, 0.4]);
         let depth = [1.0f32, 2.0, 0.0, 4.0, f32::NAN, 2.5];
-        let rays: Vec<[f64; 2]> =
-            rows.iter().flat_map(|&y| columns.map(|x| [f64::from(x), f64::from(y)])).collect();
+        let rays: Vec<[f64; 2]> = rows.iter().flat_map(|&y| columns.map(|x| [f64::from(x), f64::from(y)])).collect();
         let points: Vec<[f32; 3]> =
             depth.iter().zip(&rays).map(|(&d, r)| [d * r[0] as f32, d * r[1] as f32, d]).collect();
         let grid = all(Source::Depth(&depth, Rays::Pinhole(&columns, &rows)), DepthBias::default(), 1);

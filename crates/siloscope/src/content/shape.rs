@@ -60,7 +60,7 @@ const FEWEST: usize = 12;
 
 /// Finds the shape; `reach` is the radius of the region, about which `axis` is the centre.
 pub fn shape(samples: &[Sample], axis: [f64; 2], reach: f64) -> Option<Shape> {
-    if samples.len() < FEWEST || !(reach > 0.0) {
+    if samples.len() < FEWEST || reach.is_nan() || reach <= 0.0 {
         return None;
     }
     let n = samples.len() as f64;
@@ -139,15 +139,21 @@ impl Profile {
 
     /// Mean rise between the centre and where the profile turns, without the rounded ends.
     fn flank(&self, samples: &[Sample]) -> f64 {
-        let rings: Vec<(f64, f64)> = self.heights.iter().enumerate()
+        let rings: Vec<(f64, f64)> = self
+            .heights
+            .iter()
+            .enumerate()
             .filter_map(|(i, h)| h.map(|h| ((i as f64 + 0.5) * self.width, h)))
             .collect();
         let Some(&(_, first)) = rings.first() else { return 0.0 };
         let rise = |h: f64| h - first;
-        let Some(&(end, top)) = rings.iter().max_by(|a, b| rise(a.1).abs().total_cmp(&rise(b.1).abs())) else { return 0.0 };
+        let Some(&(end, top)) = rings.iter().max_by(|a, b| rise(a.1).abs().total_cmp(&rise(b.1).abs())) else {
+            return 0.0;
+        };
         let at = |share: f64| rings.iter().find(|(_, h)| rise(*h) / rise(top) >= share).map_or(end, |r| r.0);
         let (from, to) = (at(FLANK[0]), at(FLANK[1]));
-        let inside = samples.iter().map(|s| (distance(s, self.centre), s.height)).filter(|p| (from..=to).contains(&p.0));
+        let inside =
+            samples.iter().map(|s| (distance(s, self.centre), s.height)).filter(|p| (from..=to).contains(&p.0));
         line_slope(inside)
     }
 }
@@ -167,6 +173,7 @@ fn line_slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::panic)]
 mod tests {
     use super::*;
 

@@ -11,10 +11,12 @@ pub struct Sight {
     pub measured: f64,
     /// Share of the image's tiles that look at the silo within the sensor's range and show next to nothing.
     pub blind: f64,
-    /// Share of the measurements nearer than the sensor can measure.
+    /// Share of the measurements far nearer than the sensor can measure.
     pub near: f64,
 }
 
+/// Measurements nearer than this share of the sensor's least range are none of the silo.
+const TOO_NEAR: f64 = 0.5;
 /// Tiles along a line and along a column.
 const TILES: [usize; 2] = [16, 12];
 /// A tile with a smaller share of measurements is blind.
@@ -28,7 +30,7 @@ pub fn sight(source: Source<'_>, returns: &Returns<'_>, vessel: &Vessel, pose: &
     returns.visit(STRIDE, |line| {
         all += line.len() as f64;
         measured += line.depth.iter().filter(|&&d| d > 0.0).count() as f64;
-        near += line.depth.iter().filter(|&&d| d > 0.0 && f64::from(d) < range[0]).count() as f64;
+        near += line.depth.iter().filter(|&&d| d > 0.0 && f64::from(d) < TOO_NEAR * range[0]).count() as f64;
     });
     Sight {
         measured: measured / f64::max(all, 1.0),
@@ -100,7 +102,8 @@ pub fn wall_depth(vessel: &Vessel, pose: &SiloPose, ray: [f64; 2]) -> Option<f64
     let square = (a - m * m * q.z * q.z, b + m * m * vessel.apex * q.z, c - m * m * vessel.apex * vessel.apex);
     let root = (square.1 * square.1 - square.0 * square.2).max(0.0).sqrt();
     let crossings = [(-square.1 + root) / square.0, (-square.1 - root) / square.0, -square.2 / (2.0 * square.1)];
-    let below = |t: f64| t.is_finite() && t > 0.0 && (vessel.cylinder_bottom - 1e-9..=vessel.apex + 1e-9).contains(&(t * q.z));
+    let below =
+        |t: f64| t.is_finite() && t > 0.0 && (vessel.cylinder_bottom - 1e-9..=vessel.apex + 1e-9).contains(&(t * q.z));
     crossings.into_iter().filter(|&t| below(t)).min_by(f64::total_cmp)
 }
 

@@ -102,6 +102,7 @@ pub fn variance(covariance: &DMatrix<f64>, row: &Row) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::panic)]
 mod tests {
     use super::*;
 
@@ -123,7 +124,8 @@ mod tests {
         let basis = Basis::new([0.0, 0.0]);
         let height = |u: f64, v: f64| 0.3 - 0.2 * u + 0.1 * v + 0.5 * u.hypot(v);
         let inner: Vec<_> = disc().into_iter().filter(|[u, v]| u.hypot(*v) < 0.5).collect();
-        let Some(trend) = Sums::new(basis.len(), &observe(&basis, &inner, height)).solve(&basis, ROUGHNESS) else {
+        let Some(trend) = Sums::new(basis.functions(), &observe(&basis, &inner, height)).solve(&basis, ROUGHNESS)
+        else {
             panic!("solvable")
         };
         for place in disc() {
@@ -137,7 +139,9 @@ mod tests {
         let basis = Basis::new([0.0, 0.0]);
         let seen: Vec<_> = disc().into_iter().filter(|[u, _]| *u < 0.0).collect();
         let observations = observe(&basis, &seen, |u, _| 0.1 * u);
-        let Some(trend) = Sums::new(basis.len(), &observations).solve(&basis, ROUGHNESS) else { panic!("solvable") };
+        let Some(trend) = Sums::new(basis.functions(), &observations).solve(&basis, ROUGHNESS) else {
+            panic!("solvable")
+        };
         let covariance = trend.covariance();
         let std = |u: f64| variance(&covariance, &basis.row([u, 0.0])).sqrt();
         assert!(std(-0.5) < 1e-3 && std(0.3) > std(0.1) && std(0.9) > std(0.3));
@@ -148,7 +152,7 @@ mod tests {
         let basis = Basis::new([0.0, 0.0]);
         let wavy = |u: f64, v: f64| 0.1 * (5.0 * u).sin() * (4.0 * v).cos();
         let evidence = |height: &dyn Fn(f64, f64) -> f64, rest: f64| {
-            let sums = Sums::new(basis.len(), &observe(&basis, &disc(), height));
+            let sums = Sums::new(basis.functions(), &observe(&basis, &disc(), height));
             sums.solve(&basis, Roughness { bend: 0.3, rest, range: 0 }).map(|t| t.evidence).unwrap_or(f64::NAN)
         };
         assert!(evidence(&wavy, 0.1) > evidence(&wavy, 0.003));

@@ -45,7 +45,12 @@ impl Vessel {
         let cone = self.apex - self.cylinder_bottom;
         check("apex", self.apex, (0.0..=1e3).contains(&cone), "at or up to 1000 m below cylinder_bottom")?;
         check("top", self.top, (-1e3..self.apex).contains(&self.top), "above the cone's vertex")?;
-        check("outlet_radius", self.outlet_radius, (0.0..self.radius).contains(&self.outlet_radius), "below the radius")?;
+        check(
+            "outlet_radius",
+            self.outlet_radius,
+            (0.0..self.radius).contains(&self.outlet_radius),
+            "below the radius",
+        )?;
         check("outlet_length", self.outlet_length, (0.0..=1e3).contains(&self.outlet_length), "between 0 and 1000 m")
     }
 

@@ -48,6 +48,8 @@ pub struct Volume {
     pub at_wall: Option<f64>,
     /// Share of the angles at which the surface reaches the cylinder's wall.
     pub wall_share: f64,
+    /// Greatest distance of the content's rim from the axis.
+    pub reach: f64,
     /// ∫ φ dA of the trend's functions over the surface.
     pub functions: DVector<f64>,
     /// Weights of the cells' detail in ∫ z dA.
@@ -58,7 +60,7 @@ pub struct Volume {
 
 /// Integrates the content.
 pub fn integrate(surface: &Surface, vessel: &Vessel, kinds: &[Kind]) -> Volume {
-    let functions = surface.basis.len();
+    let functions = surface.basis.functions();
     let mut sums = Volume {
         volume: 0.0,
         area: 0.0,
@@ -67,8 +69,9 @@ pub fn integrate(surface: &Surface, vessel: &Vessel, kinds: &[Kind]) -> Volume {
         extremes: [f64::INFINITY, f64::NEG_INFINITY],
         at_wall: None,
         wall_share: 0.0,
+        reach: 0.0,
         functions: DVector::zeros(functions),
-        cells: vec![0.0; surface.grid.len()],
+        cells: vec![0.0; surface.grid.count()],
         geometry: Shells::default(),
     };
     let mut rims = (0.0, 0.0);
@@ -115,14 +118,15 @@ impl Spoke<'_> {
         let mut inner = (0.0, self.thickness(0.0));
         for piece in self.ends() {
             let outer = (piece, self.thickness(piece));
-            if self.kind(0.5 * (inner.0 + piece)) != Kind::Bare {
-                if let Some((from, to)) = self.covered(inner, outer) {
-                    self.piece(from, to, sums);
-                    rim = Some(to);
-                }
+            if self.kind(0.5 * (inner.0 + piece)) != Kind::Bare
+                && let Some((from, to)) = self.covered(inner, outer)
+            {
+                self.piece(from, to, sums);
+                rim = Some(to);
             }
             inner = outer;
         }
+        sums.reach = sums.reach.max(rim?);
         let at_wall = rim? >= self.vessel.radius * (1.0 - 1e-9);
         if at_wall {
             self.wall(sums);

@@ -1,6 +1,7 @@
 //! Whether the wall still lies where the calibration has it.
 
 use super::doubt::{Covariance, Lever, POSE};
+use super::fit::Surface;
 use super::returns::Returns;
 use super::vessel::Vessel;
 use crate::sensor::NoiseLaw;
@@ -23,6 +24,8 @@ pub struct Shift {
 const SAMPLED: f64 = 2_500.0;
 /// Returns farther from the wall than this share of the radius don't belong to it.
 const GATE: f64 = 0.08;
+/// Wall closer above the content than this share of the radius may be content.
+const CLEARANCE: f64 = 0.1;
 /// Unevenness of a wall over short distances, metres: what a return's distance scatters beside the sensor's noise.
 const UNEVEN: f64 = 0.005;
 /// Rounds of reweighting, and the residual beyond which a return loses all say, in standard deviations.
@@ -45,8 +48,9 @@ pub fn shift(
     lever: &Lever,
     noise: &NoiseLaw,
     covariance: &Covariance,
+    surface: Option<&Surface>,
 ) -> Option<Shift> {
-    let residuals = near_wall(returns, vessel, lever, noise);
+    let residuals = near_wall(returns, vessel, lever, noise, surface);
     let mut change = Vector4::zeros();
     let mut normal = Matrix4::zeros();
     if residuals.len() < FEWEST {
@@ -73,7 +77,13 @@ pub fn shift(
     })
 }
 
-fn near_wall(returns: &Returns<'_>, vessel: &Vessel, lever: &Lever, noise: &NoiseLaw) -> Vec<Residual> {
+fn near_wall(
+    returns: &Returns<'_>,
+    vessel: &Vessel,
+    lever: &Lever,
+    noise: &NoiseLaw,
+    surface: Option<&Surface>,
+) -> Vec<Residual> {
     let stride = (returns.len() as f64 / SAMPLED).sqrt().round().max(1.0) as usize;
     let gate = GATE * vessel.radius;
     let mut residuals = Vec::new();
@@ -83,7 +93,8 @@ fn near_wall(returns: &Returns<'_>, vessel: &Vessel, lever: &Lever, noise: &Nois
             let radius = point[0].hypot(point[1]);
             let distance = radius - vessel.radius;
             let on_cylinder = point[2] > vessel.top && point[2] < vessel.cylinder_bottom - gate;
-            if distance.abs() < gate && on_cylinder {
+            let content = |s: &Surface| s.height(point[0], point[1]) - point[2] < CLEARANCE * vessel.radius;
+            if distance.abs() < gate && on_cylinder && !surface.is_some_and(content) {
                 let out = [point[0] / radius, point[1] / radius];
                 let shifts = lever.shifts(point);
                 let along = |k: usize| out[0] * shifts[k][0] + out[1] * shifts[k][1];

@@ -1,0 +1,183 @@
+"""How much a silo holds: from its geometry, from a datasheet, or from a strapping table."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from siloscope.errors import InputError, UsageError
+from siloscope.estimate import SiloGeometry
+
+LARGEST_FILE = 10_000_000
+"""Bytes of a strapping table."""
+
+LENGTH_STD = 0.01
+"""Standard deviation of a length of a datasheet, m."""
+
+
+@dataclass(frozen=True)
+class Datasheet:
+    """A silo's inner lengths as its maker gives them, m; None where it does not tell."""
+
+    diameter: float | None = None
+    cylinder: float | None = None
+    """Height of the cylinder."""
+    cone: float | None = None
+    """Height of the cone, from the cylinder's bottom to its vertex; 0 for a flat floor."""
+    outlet_diameter: float = 0.0
+    """Diameter of the outlet pipe; 0 for none."""
+    outlet_length: float = 0.0
+    """How far the pipe's closed end lies below the cone's vertex."""
+
+    def __post_init__(self) -> None:
+        for name, least in (("diameter", 0.01), ("cylinder", 0.0), ("cone", 0.0)):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and least <= value <= 200.0):
+                raise UsageError(f"{name} must be between {least:g} and 200 m, got {value}")
+        for name in ("outlet_diameter", "outlet_length"):
+            if not 0.0 <= getattr(self, name) <= 20.0:
+                raise UsageError(f"{name.replace('_', '-')} must be between 0 and 20 m, got {getattr(self, name)}")
+
+    def to_dict(self) -> dict[str, float | None]:
+        """Plain data."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+@dataclass(frozen=True, eq=False)
+class Strapping:
+    """A strapping table: volume (m³) of the silo up to heights (m) above its cone's vertex, both rising."""
+
+    heights: tuple[float, ...]
+    volumes: tuple[float, ...]
+    source: str = "strapping table"
+
+    def __post_init__(self) -> None:
+        pairs = list(zip(self.heights, self.volumes, strict=True))
+        if len(pairs) < 2:
+            raise InputError(f"{self.source}: a strapping table needs at least two rows of height and volume")
+        for (h0, v0), (h1, v1) in itertools.pairwise(pairs):
+            if not (h1 > h0 and v1 >= v0):
+                raise InputError(f"{self.source}: heights and volumes must rise from row to row; see {h1:g}, {v1:g}")
+        if self.volumes[0] < 0.0:
+            raise InputError(f"{self.source}: the volume at {self.heights[0]:g} m is negative")
+
+    @property
+    def capacity(self) -> float:
+        """Volume of the last row, m³."""
+        return self.volumes[-1]
+
+    def volume(self, height: float) -> float:
+        """Volume under a level plane at a height above the vertex, m³; linear between the rows, none beyond them."""
+        return float(np.interp(height, self.heights, self.volumes, left=0.0, right=self.capacity))
+
+    @classmethod
+    def read(cls, path: str | Path) -> Strapping:
+        """Reads a CSV file of two columns, height (m) and volume (m³), with or without a heading.
+
+        Raises `InputError` that names file, line and cause.
+        """
+        path = Path(path)
+        try:
+            if path.stat().st_size > LARGEST_FILE:
+                raise InputError(f"{path}: too large for a strapping table; give two columns, height and volume")
+            text = path.read_text("utf-8-sig")
+        except OSError as error:
+            raise InputError(f"{path}: can't be read ({error.strerror}); check its name and permissions") from None
+        except UnicodeDecodeError:
+            raise InputError(f"{path}: no text; save the strapping table as CSV in UTF-8") from None
+        return cls(*_columns(text, path), str(path))
+
+
+def _columns(text: str, path: Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    semicolons = text.count(";") > text.count(",")
+    rows = csv.reader(text.splitlines(), delimiter=";" if semicolons else ",")
+    found: list[tuple[float, float]] = []
+    for number, row in enumerate(rows, 1):
+        cells = [cell.strip() for cell in row if cell.strip()]
+        if not cells or cells[0].startswith("#"):
+            continue
+        pair = _pair(cells, decimal_comma=semicolons)
+        if pair is None and not found and number <= 2:
+            continue  # the heading
+        if pair is None:
+            raise InputError(f"{path}, line {number}: '{', '.join(row)}' is not a height and a volume")
+        found.append(pair)
+    if not found:
+        raise InputError(f"{path}: no rows; give two columns, height (m) and volume (m³)")
+    heights, volumes = zip(*found, strict=True)
+    return heights, volumes
+
+
+def _pair(cells: list[str], decimal_comma: bool) -> tuple[float, float] | None:
+    try:
+        numbers = [float(c.replace(",", ".") if decimal_comma else c) for c in cells[:2]]
+    except ValueError:
+        return None
+    return (numbers[0], numbers[1]) if len(numbers) == 2 and all(map(math.isfinite, numbers)) else None
+
+
+@dataclass(frozen=True)
+class Lengths:
+    """A silo's lengths for measuring: what was calibrated, completed by a datasheet. z as in `SiloGeometry`."""
+
+    geometry: SiloGeometry
+    top: float
+    """z of the silo's upper edge."""
+    top_from: str
+    """Where `top` comes from: "datasheet", "given", or "camera" for the camera's own height."""
+    assumed: tuple[str, ...]
+    """What was taken from elsewhere than the calibration, in words."""
+    added_variance: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Variance of radius, cylinder_bottom and apex where they are the datasheet's, m²."""
+    cone_only: bool = False
+    """Whether nobody knows the cylinder, so that `geometry` is the cone continued up to the camera."""
+
+
+def complete(seen: SiloGeometry, sheet: Datasheet, top: float | None) -> Lengths:
+    """Fills what was not seen from the datasheet; what was seen stays."""
+    radius, bottom, apex = seen.radius, seen.cylinder_bottom, seen.apex
+    assumed: list[str] = []
+    variance = [0.0, 0.0, 0.0]
+    own = LENGTH_STD**2
+    if radius is None and sheet.diameter is not None:
+        radius, variance[0] = sheet.diameter / 2.0, own / 4.0
+        assumed.append("radius from the datasheet")
+    if bottom is None and top is not None and sheet.cylinder is not None:
+        bottom, variance[1] = top + sheet.cylinder, own
+        assumed.append("cylinder's bottom from the datasheet and the given top")
+    if bottom is None and apex is not None and sheet.cone is not None:
+        bottom, variance[1] = apex - sheet.cone, own
+        assumed.append("cylinder's bottom from the vertex and the datasheet's cone")
+    if apex is None and bottom is not None and sheet.cone is not None:
+        apex, variance[2] = bottom + sheet.cone, own
+        assumed.append("cone's vertex from the cylinder's bottom and the datasheet's cone")
+    edge, source = _top(bottom, sheet, top)
+    if source == "camera":
+        assumed.append("the silo can be filled up to the camera's height")
+    added = (variance[0], variance[1], variance[2])
+    return Lengths(SiloGeometry(radius, bottom, apex), edge, source, tuple(assumed), added)
+
+
+def _top(bottom: float | None, sheet: Datasheet, top: float | None) -> tuple[float, str]:
+    if top is not None:
+        return top, "given"
+    if bottom is not None and sheet.cylinder is not None:
+        return bottom - sheet.cylinder, "datasheet"
+    return 0.0, "camera"
+
+
+def missing(geometry: SiloGeometry) -> tuple[str, ...]:
+    """Names of the lengths that a volume needs and nobody knows."""
+    return tuple(name for name in ("radius", "cylinder_bottom", "apex") if getattr(geometry, name) is None)
+
+
+def to_plain(lengths: Lengths) -> dict[str, Any]:
+    """Plain data for a result's ``silo``."""
+    geometry = SiloGeometry(apex=lengths.geometry.apex) if lengths.cone_only else lengths.geometry
+    return {**geometry.to_dict(), "top": lengths.top, "top_from": lengths.top_from}

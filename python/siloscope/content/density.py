@@ -1,0 +1,196 @@
+"""From cubic metres to kilograms: bulk densities, their spread, and how feed settles under its own weight."""
+
+from __future__ import annotations
+
+import itertools
+import math
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope.errors import InputError, UsageError
+
+GRAVITY = 9.81
+"""m/s²."""
+DENSITIES = (10.0, 10_000.0)
+"""Bulk densities that a silo may hold, kg/m³."""
+LARGEST_FILE = 100_000
+"""Bytes; a product is a few lines of text."""
+STEPS = 400
+"""Slices of a column in which the pressure is followed."""
+
+
+@dataclass(frozen=True)
+class Density:
+    """Bulk density of what is in the silo.
+
+    With a compaction curve the density grows with the vertical pressure, which follows Janssen's equation
+    ``σ(h) = ρ g R / (2 μ K) · (1 - exp(-2 μ K h / R))`` at the depth h below the surface of a cylinder of radius R.
+    """
+
+    name: str
+    loose: float
+    """Density as poured, kg/m³."""
+    std: float = 0.0
+    """Standard deviation of the density, kg/m³."""
+    source: str = ""
+    """Where the figures come from."""
+    compaction: tuple[tuple[float, float], ...] = ()
+    """Vertical pressure (Pa) and density there (kg/m³), pressures rising from 0; empty for one density."""
+    friction: float = 0.4
+    """μ, of the feed on the wall."""
+    pressure_ratio: float = 0.5
+    """K, horizontal by vertical pressure."""
+
+    def __post_init__(self) -> None:
+        _between(f"{self.name}: density", self.loose, *DENSITIES)
+        _between(f"{self.name}: density_std", self.std, 0.0, self.loose)
+        _between(f"{self.name}: friction", self.friction, 0.0, 2.0)
+        _between(f"{self.name}: pressure_ratio", self.pressure_ratio, 0.0, 2.0)
+        pressures = [p for p, _ in self.compaction]
+        rising = all(a < b for a, b in itertools.pairwise(pressures))
+        if self.compaction and (pressures[0] != 0.0 or not rising):
+            raise InputError(f"{self.name}: compaction must begin at pressure 0 and rise; sort its entries")
+        for _, density in self.compaction:
+            _between(f"{self.name}: compaction density", density, *DENSITIES)
+
+    def mean(self, heights: NDArray[np.float64], radius: float) -> float:
+        """Mean density, kg/m³, of columns of these heights (N,), m, that stand side by side in a silo of a radius."""
+        columns = heights[heights > 0.0]
+        if not self.compaction or not len(columns):
+            return self.loose
+        depth = np.linspace(0.0, float(columns.max()), STEPS + 1)
+        load = np.concatenate([[0.0], np.cumsum(self._densities(depth, radius))])
+        mass = np.interp(columns, depth, load)
+        return float(mass.sum() / columns.sum())
+
+    def _densities(self, depth: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
+        """Mass per area of each slice, kg/m², the pressure carried down from slice to slice: dσ/dh = ρ g - σ/Λ."""
+        pressures, densities = np.array(self.compaction).T
+        step = depth[1] - depth[0]
+        carried = 2.0 * self.friction * self.pressure_ratio / radius
+        sigma, slices = 0.0, np.empty(len(depth) - 1)
+        for i in range(len(slices)):
+            rho = float(np.interp(sigma, pressures, densities))
+            slices[i] = rho * step
+            held = math.exp(-carried * step)
+            lasting = rho * GRAVITY * (-math.expm1(-carried * step) / carried if carried > 0.0 else step)
+            sigma = sigma * held + lasting
+        return slices
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "name": self.name,
+            "loose_kg_m3": self.loose,
+            "std_kg_m3": self.std,
+            "source": self.source,
+            "compaction": [list(entry) for entry in self.compaction],
+            "friction": self.friction if self.compaction else None,
+            "pressure_ratio": self.pressure_ratio if self.compaction else None,
+        }
+
+
+def choose(
+    density: float | None = None, density_std: float | None = None, product: str | Path | Density | None = None
+) -> Density | None:
+    """The density that a caller names: a number, a product of the table, or a product file; None for none.
+
+    Raises
+    ------
+    UsageError
+        For a density and a product at once, a deviation alone, or a product that nobody knows.
+    InputError
+        For a file that is no product.
+    """
+    if density is not None and product is not None:
+        raise UsageError("give a density or a product, not both")
+    if density is None and product is None:
+        if density_std is not None:
+            raise UsageError("a density's deviation without a density; give --density too")
+        return None
+    if density is not None:
+        return _number(density, density_std)
+    chosen = product if isinstance(product, Density) else load(str(product))
+    return chosen if density_std is None else _with_std(chosen, density_std)
+
+
+def products() -> dict[str, Density]:
+    """The products that come with siloscope, by name."""
+    table = tomllib.loads(resources.files(__package__).joinpath("products.toml").read_text("utf-8"))
+    return {name: _product(name, entry) for name, entry in table.items()}
+
+
+def load(product: str) -> Density:
+    """A product by name, or from a TOML file with ``density`` and what else `Density` has."""
+    known = products()
+    if product in known:
+        return known[product]
+    path = Path(product)
+    if not path.is_file():
+        raise UsageError(f"unknown product '{product}'; give a TOML file's path or one of: {', '.join(sorted(known))}")
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise InputError(f"{path}: too large for a product; give a TOML file with a density")
+        table = tomllib.loads(path.read_text("utf-8"))
+    except OSError as error:
+        raise InputError(f"{path}: can't be read ({error.strerror}); check its name and permissions") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: no TOML product ({error}); see the manual's page on content") from None
+    return _product(str(table.pop("name", path.stem)), table)
+
+
+def _product(name: str, table: Any) -> Density:
+    known = {"density", "density_std", "source", "friction", "pressure_ratio", "compaction"}
+    if not isinstance(table, dict) or "density" not in table:
+        raise InputError(f"{name}: a product needs a density, kg/m³")
+    unknown = sorted(set(table) - known)
+    if unknown:
+        raise InputError(f"{name}: unknown entry '{unknown[0]}'; known are {', '.join(sorted(known))}")
+    numbers = {key: _finite(f"{name}: {key}", table[key]) for key in ("density_std", "friction", "pressure_ratio")
+               if key in table}  # fmt: skip
+    return Density(
+        name,
+        _finite(f"{name}: density", table["density"]),
+        numbers.get("density_std", 0.0),
+        str(table.get("source", "")),
+        _curve(name, table.get("compaction", [])),
+        numbers.get("friction", 0.4),
+        numbers.get("pressure_ratio", 0.5),
+    )
+
+
+def _curve(name: str, entries: Any) -> tuple[tuple[float, float], ...]:
+    if not isinstance(entries, list) or not all(isinstance(e, list) and len(e) == 2 for e in entries):
+        raise InputError(f"{name}: compaction must be a list of [pressure in Pa, density in kg/m³]")
+    return tuple((_finite(f"{name}: pressure", p), _finite(f"{name}: density", d)) for p, d in entries)
+
+
+def _number(density: float, std: float | None) -> Density:
+    if isinstance(density, bool) or not DENSITIES[0] <= density <= DENSITIES[1]:
+        raise UsageError(f"density must be between {DENSITIES[0]:g} and {DENSITIES[1]:g} kg/m³, got {density}")
+    return _with_std(Density("given", float(density), source="given by the caller"), std or 0.0)
+
+
+def _with_std(chosen: Density, std: float) -> Density:
+    from dataclasses import replace
+
+    if isinstance(std, bool) or not 0.0 <= std <= chosen.loose:
+        raise UsageError(f"the density's deviation must be between 0 and {chosen.loose:g} kg/m³, got {std}")
+    return replace(chosen, std=float(std))
+
+
+def _between(what: str, value: float, least: float, most: float) -> None:
+    if not (math.isfinite(value) and least <= value <= most):
+        raise InputError(f"{what} must be between {least:g} and {most:g}, got {value}")
+
+
+def _finite(what: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise InputError(f"{what} must be a finite number, got {value!r}")
+    return float(value)

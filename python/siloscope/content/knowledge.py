@@ -1,0 +1,178 @@
+"""What is known before a frame is measured: pose, silo and sensor with one covariance over all of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope import sensors
+from siloscope.calibration import Calibration
+from siloscope.content.capacity import Datasheet, Lengths, complete
+from siloscope.errors import InputError, UsageError
+from siloscope.estimate import SiloGeometry
+from siloscope.pose import SiloPose
+from siloscope.sensors import SensorProfile
+
+PARAMETERS = ("r_x", "r_y", "t_x", "t_y", "radius", "cylinder_bottom", "apex", "offset", "scale", "quadratic")
+"""Order of the covariance; the last three are the sensor's depth bias."""
+
+TYPICAL_NOISE = (0.002, 0.0, 0.0, 0.0, 0.0019, 2.36)
+"""Noise law where nothing tells the sensor's own: that of a structured-light camera (`orbbec-astra`)."""
+
+WALL_STD = 0.002
+"""How uneven a wall is that nothing tells more about, m (standard deviation)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Knowledge:
+    """Everything that the core needs beside the frame."""
+
+    pose: SiloPose
+    lengths: Lengths
+    covariance: NDArray[np.float64]
+    """(10, 10) over `PARAMETERS`."""
+    bias: tuple[float, float, float]
+    noise: tuple[float, float, float, float, float, float]
+    range: tuple[float, float]
+    assumed: tuple[str, ...] = ()
+    config: dict[str, Any] = field(default_factory=dict)
+
+
+def know(
+    calibration: Calibration, sensor: SensorProfile | None, sheet: Datasheet, top: float | None, diameter: float | None
+) -> Knowledge:
+    """Puts calibration, sensor profile and datasheet together.
+
+    Raises
+    ------
+    InputError
+        For a calibration that was refused.
+    UsageError
+        For a diameter that contradicts the calibration, or a sensor with another bias than the calibration's.
+    """
+    if calibration.pose is None:
+        raise InputError(f"the calibration has no answer ({calibration.reason}); calibrate with frames that show wall")
+    own = _profile(calibration)
+    profile = sensor or own or sensors.UNKNOWN
+    if sensor is not None and own is not None and sensor.bias != own.bias:
+        raise UsageError(
+            f"the calibration was made with the depth bias of '{own.name}', not of '{sensor.name}'; leave the sensor "
+            "out, or calibrate with it"
+        )
+    lengths = _cone_alone(calibration, _joint(calibration, complete(calibration.silo, sheet, top), sheet))
+    covariance = _covariance(calibration, lengths.cone_only) + np.diag(
+        [0.0] * 4 + list(lengths.added_variance) + [0.0] * 3
+    )
+    _check_diameter(diameter, calibration.silo, float(covariance[4, 4]))
+    assumed = list(lengths.assumed)
+    if profile.noise is None:
+        assumed.append("noise of a typical structured-light sensor")
+    if calibration.parameters is None:
+        assumed.append("the calibration was averaged by the paper's rule: its lengths have no covariance")
+    return Knowledge(
+        calibration.pose,
+        lengths,
+        covariance,
+        _bias(calibration, profile),
+        profile.noise or TYPICAL_NOISE,
+        profile.range,
+        tuple(assumed),
+        {"sensor": profile.to_dict()},
+    )
+
+
+def _joint(calibration: Calibration, lengths: Lengths, sheet: Datasheet) -> Lengths:
+    """The cylinder's bottom where the cone that was seen is as wide as the datasheet's diameter."""
+    geometry = lengths.geometry
+    slope = math.nan if calibration.parameters is None else float(calibration.parameters[5])
+    if geometry.radius is None or geometry.cylinder_bottom is not None or geometry.apex is None or not slope > 0.0:
+        return lengths
+    bottom = geometry.apex - geometry.radius / slope
+    edge = lengths.top if sheet.cylinder is None or lengths.top_from == "given" else bottom - sheet.cylinder
+    told = lengths.top_from if edge == lengths.top else "datasheet"
+    said = (*lengths.assumed, "cylinder's bottom where the seen cone is as wide as the given diameter")
+    variance = (lengths.added_variance[0], lengths.added_variance[0] / slope**2, 0.0)
+    made = SiloGeometry(geometry.radius, bottom, geometry.apex)
+    return replace(lengths, geometry=made, top=edge, top_from=told, assumed=said, added_variance=variance)
+
+
+def _cone_alone(calibration: Calibration, lengths: Lengths) -> Lengths:
+    """Where nobody knows the cylinder, the cone continued up to the camera: content in the cone needs no more."""
+    if lengths.geometry.radius is not None or calibration.parameters is None:
+        return lengths
+    slope, apex = (float(v) for v in calibration.parameters[5:7])
+    if not (math.isfinite(slope * apex) and slope > 0.0 and apex > 0.0):
+        return lengths
+    said = ("the content lies in the cone: the cylinder was never seen",)
+    return replace(
+        lengths,
+        geometry=SiloGeometry(slope * apex, 0.0, apex),
+        assumed=tuple(a for a in lengths.assumed if "filled" not in a) + said,
+        cone_only=True,
+    )
+
+
+def _profile(calibration: Calibration) -> SensorProfile | None:
+    """The sensor profile that the calibration was made with, as its ``config`` tells it."""
+    table: Any = calibration.config.get("sensor")
+    try:
+        bias, bias_std = (tuple(float(table[key][n]) for n in sensors.BIAS) for key in ("bias", "bias_std"))
+        noise = None if table["noise"] is None else tuple(float(table["noise"][name]) for name in sensors.NOISE)
+        name = str(table["name"])
+    except (TypeError, KeyError, ValueError):
+        return None
+    return SensorProfile(name, bias, bias_std, noise, _ranges().get(name, (0.0, math.inf)))  # type: ignore[arg-type]
+
+
+@cache
+def _ranges() -> dict[str, tuple[float, float]]:
+    """Ranges of the shipped profiles by their names; a calibration does not keep the range."""
+    return {profile.name: profile.range for profile in map(sensors.load, sensors.names())}
+
+
+def _bias(calibration: Calibration, profile: SensorProfile) -> tuple[float, float, float]:
+    """The depth bias that the calibration found, or the profile's."""
+    if calibration.parameters is None or not np.isfinite(calibration.parameters[7:]).all():
+        return profile.bias
+    offset, scale, quadratic = (float(b) for b in calibration.parameters[7:])
+    return offset, scale, quadratic
+
+
+def _covariance(calibration: Calibration, cone_only: bool) -> NDArray[np.float64]:
+    """The calibration's covariance with the cylinder's bottom in the place of the cone's slope.
+
+    Of a cone alone, the radius is that at the camera's height, R = m z_a, and the bottom is fixed there.
+    """
+    if calibration.parameters is None or calibration.parameter_covariance is None:
+        made = np.zeros((10, 10))
+        if calibration.covariance is not None:
+            made[:4, :4] = calibration.covariance
+        return made
+    jacobian = np.eye(10)
+    radius, slope, apex = calibration.parameters[4:7]
+    if cone_only:
+        jacobian[4, 4:7] = (0.0, apex, slope)
+        jacobian[5, 5] = 0.0
+    elif np.isfinite([radius, slope, apex]).all():  # cylinder_bottom = apex - R / m
+        jacobian[5, 4:7] = (-1.0 / slope, radius / slope**2, 1.0)
+    else:
+        jacobian[5, 5] = 0.0
+    made = jacobian @ np.nan_to_num(calibration.parameter_covariance) @ jacobian.T
+    return np.asarray(0.5 * (made + made.T))
+
+
+def _check_diameter(diameter: float | None, silo: SiloGeometry, variance: float) -> None:
+    """A tape-measured diameter must agree with the calibration's; it belongs into the calibration."""
+    if diameter is None or silo.radius is None:
+        return
+    gap = abs(diameter / 2.0 - silo.radius)
+    if gap > 5.0 * math.sqrt(variance) + 0.005:
+        raise UsageError(
+            f"a diameter of {diameter:g} m does not fit the calibration's {2 * silo.radius:.3f} m; "
+            "calibrate with --diameter, which puts every length right"
+        )

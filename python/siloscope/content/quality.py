@@ -1,0 +1,194 @@
+"""What may be wrong with a reading: a stable code for each case, what it means, and what to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+QUALITY: dict[str, tuple[str, str]] = {
+    "too-little-seen": (
+        "too little of the content's surface is seen to tell how much there is",
+        "clean the lens, free the view, or turn the camera so that it looks at the middle of the silo",
+    ),
+    "partly-seen": (
+        "less than a third of the surface is seen; the rest is continued from its slope",
+        "mind the larger deviation; a camera farther from the wall or with a wider view sees more",
+    ),
+    "sensor-buried": (
+        "nearly everything measured is far nearer than the sensor can measure",
+        "look whether the sensor is buried in feed, caked, or covered, and measure again when it is free",
+    ),
+    "dust-or-fog": (
+        "many single returns float between sensor and surface, as dust or fog make them",
+        "measure again when filling is over and the dust has settled",
+    ),
+    "lens-film": (
+        "large parts of the picture that should show the silo within the sensor's range show nothing",
+        "clean the window; in a cold silo warm it against condensation",
+    ),
+    "obstruction": (
+        "something hangs or stands between sensor and surface",
+        "look what it is; the surface behind it is continued from around it",
+    ),
+    "stuck-feed": (
+        "feed hangs on the wall above the surface",
+        "its volume is not counted; knock the silo free, and look for a bridge",
+    ),
+    "rathole": (
+        "the surface has a steep hole",
+        "the flow comes through a pipe in the feed; it may collapse at once, keep out and have it broken up",
+    ),
+    "filling-in-progress": (
+        "the surface moved since the frame before",
+        "measure again when filling or emptying is over; this reading belongs to its own moment",
+    ),
+    "camera-moved": (
+        "the wall no longer lies where the calibration has it",
+        "calibrate anew with frames taken since the camera was moved",
+    ),
+    "below-the-floor": (
+        "much of what is seen lies below the silo's floor",
+        "check that calibration and frame are of one silo and one camera",
+    ),
+}
+"""Code: what it means, what to do."""
+
+REFUSING = ("too-little-seen", "sensor-buried", "camera-moved", "below-the-floor")
+"""Codes that may leave a reading without an answer; the others come beside one."""
+
+LEAST_COVERAGE = 0.05
+"""Share of the surface that must be seen."""
+PARTLY = 1.0 / 3.0
+"""Below this share a reading carries the remark that it is partly seen."""
+LARGEST_STD = 0.1
+"""Largest standard deviation that still is an answer, as a share of the capacity."""
+BURIED = 0.5
+"""Share of the returns that are too near."""
+DUSTY = 0.01
+"""Share of floating returns, each alone, among those over the surface."""
+BLIND = 0.25
+"""Share of the picture's tiles that should show the silo and don't."""
+OBSTRUCTED = 0.01
+"""Share of floating returns in groups, or of the silo's area under things that are no surface."""
+OUTSIDE = 0.03
+"""Share of the returns outside the silo's wall that no clean view has."""
+SUNKEN = 0.1
+"""Share of the seen cells below the floor with which calibration and frame do not belong together."""
+SHIFTED = 5.0
+"""Standard deviations by which the wall must have moved."""
+MATTERS = 3.0
+"""A move of the camera refuses the reading where it changes the volume by so many standard deviations."""
+MOVING = 4.0
+"""Standard deviations of the difference between two frames' volumes that is a movement."""
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A code of `QUALITY` with what was seen."""
+
+    code: str
+    seen: str
+    """The figures that led to it, in words."""
+    refuses: bool = False
+    """Whether it leaves the reading without an answer."""
+
+    @property
+    def message(self) -> str:
+        """What it means."""
+        return QUALITY[self.code][0]
+
+    @property
+    def advice(self) -> str:
+        """What to do."""
+        return QUALITY[self.code][1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {"code": self.code, "message": self.message, "advice": self.advice, "seen": self.seen,
+                "refuses": self.refuses}  # fmt: skip
+
+
+def remarks(found: dict[str, Any], coverage: float | None, capacity: float | None, area: float) -> list[Remark]:
+    """The remarks on what the core found in a frame; `area` is the silo's cross-section, m²."""
+    return [
+        *_sight(found),
+        *_coverage(found, coverage, capacity),
+        *_floating(found, area),
+        *_shape(found),
+        *_wall(found),
+    ]
+
+
+def _sight(found: dict[str, Any]) -> list[Remark]:
+    measured, blind, near = found["sight"]
+    made = []
+    if near > BURIED:
+        made.append(Remark("sensor-buried", f"{100 * near:.0f} % of the returns are too near", True))
+    if blind > BLIND:
+        made.append(Remark("lens-film", f"{100 * blind:.0f} % of the picture is blind"))
+    if measured == 0.0:
+        made.append(Remark("too-little-seen", "no pixel has a depth", True))
+    return made
+
+
+def _coverage(found: dict[str, Any], coverage: float | None, capacity: float | None) -> list[Remark]:
+    if found["sight"][0] == 0.0:
+        return []
+    if coverage is None:
+        return [Remark("too-little-seen", "no surface could be fitted", True)]
+    seen = f"{100 * coverage:.0f} % of the surface is seen"
+    if coverage < LEAST_COVERAGE:
+        return [Remark("too-little-seen", seen, True)]
+    std = found["std"]["total"]
+    if capacity and std > LARGEST_STD * capacity:
+        return [Remark("too-little-seen", f"{seen}; the deviation is {100 * std / capacity:.0f} % of the silo", True)]
+    return [Remark("partly-seen", seen)] if coverage < PARTLY else []
+
+
+def _floating(found: dict[str, Any], area: float) -> list[Remark]:
+    returns, wall, outside, above, coherent = found["tally"]
+    over = max(returns - wall - outside, 1.0)
+    hanging = sum(size for size, _, _ in found["things"]) / area
+    loose, grouped = (above - coherent) / over, coherent / over
+    made = []
+    if loose > DUSTY and loose > grouped:
+        made.append(Remark("dust-or-fog", f"{100 * loose:.1f} % of the returns float alone"))
+    free = sum(size for size, _, at_wall in found["things"] if not at_wall) / area
+    if free > OBSTRUCTED or grouped > max(OBSTRUCTED, loose):
+        seen = f"{100 * max(free, grouped):.1f} % of the view is taken"
+        made.append(Remark("obstruction", seen))
+    if hanging - free > OBSTRUCTED:
+        made.append(Remark("stuck-feed", f"over {100 * (hanging - free):.1f} % of the silo's area"))
+    return made
+
+
+def _shape(found: dict[str, Any]) -> list[Remark]:
+    holes = found["holes"]
+    if not holes:
+        return []
+    area, above, _ = max(holes)
+    return [Remark("rathole", f"a hole of {area:.2f} m², {-above:.2f} m deep")]
+
+
+def _wall(found: dict[str, Any]) -> list[Remark]:
+    sunken = found["sunken"]
+    below = [Remark("below-the-floor", f"{100 * sunken:.0f} % of the cells", True)] if sunken > SUNKEN else []
+    return [*_moved(found), *below]
+
+
+def _moved(found: dict[str, Any]) -> list[Remark]:
+    returns, _, outside, _, _ = found["tally"]
+    share = outside / max(returns, 1.0)
+    if share > OUTSIDE:
+        return [Remark("camera-moved", f"{100 * share:.0f} % of the returns lie outside the wall", True)]
+    if found["shift"] is None:
+        return []
+    change, std, _, _ = found["shift"]
+    sigmas = max(abs(c) / s for c, s in zip(change, std, strict=True))
+    if sigmas < SHIFTED:
+        return []
+    moved = 1e3 * (change[2] ** 2 + change[3] ** 2) ** 0.5
+    turned = 1e3 * (change[0] ** 2 + change[1] ** 2) ** 0.5
+    matter = abs(sum(c * d for c, d in zip(change, found["derivatives"], strict=False)))
+    refuses = matter > MATTERS * max(found["std"]["total"], 1e-9)
+    return [Remark("camera-moved", f"by {moved:.1f} mm and {turned:.2f} mrad, {sigmas:.0f} deviations", refuses)]

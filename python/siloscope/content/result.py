@@ -1,0 +1,146 @@
+"""What one frame says about the content: level, volume, mass, and how sure they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from siloscope.content.capacity import Lengths, to_plain
+from siloscope.content.quality import Remark
+from siloscope.content.surface_map import Shape, SurfaceMap
+
+SCHEMA = "siloscope.content/1"
+
+DATUMS = ("cone-vertex", "lowest-seen")
+"""From where heights are measured upwards."""
+
+
+@dataclass(frozen=True)
+class Level:
+    """Heights of the surface over the datum, m; None where they can't be told."""
+
+    mean: float | None = None
+    """By area seen from above."""
+    min: float | None = None
+    max: float | None = None
+    at_axis: float | None = None
+    at_wall: float | None = None
+    """Mean along the line where the surface meets cylinder or cone."""
+    std: float | None = None
+    """Standard deviation of the mean."""
+
+    def to_dict(self) -> dict[str, float | None]:
+        """Plain data."""
+        return {name: getattr(self, name) for name in ("mean", "min", "max", "at_axis", "at_wall", "std")}
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Standard deviations of the volume by cause, m³. Pose, geometry and depth are correlated: they don't add up."""
+
+    pose: float
+    """The camera's pose."""
+    geometry: float
+    """The silo's lengths."""
+    depth: float
+    """The sensor's systematic depth error, its scale above all."""
+    noise: float
+    """The sensor's noise."""
+    unseen: float
+    """What is not seen of the surface."""
+    grid: float
+    """The map's cells."""
+
+    def to_dict(self) -> dict[str, float]:
+        """Plain data."""
+        return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+@dataclass(frozen=True, eq=False)
+class Content:
+    """The content of a silo at one moment. Cubic metres, metres, kilograms, radians.
+
+    A refused reading (`status` "refused") has no numbers; `reason` is one of `siloscope.content.quality.QUALITY` and
+    `message` says what it means and what to do. A number that needs something unknown is None, and `missing` names it.
+    """
+
+    status: str
+    reason: str | None = None
+    message: str | None = None
+    volume: float | None = None
+    volume_std: float | None = None
+    parts: Parts | None = None
+    capacity: float | None = None
+    capacity_from: str | None = None
+    """"calibration", "datasheet" or "strapping"."""
+    level: Level = field(default_factory=Level)
+    height_datum: str | None = None
+    """One of `DATUMS`."""
+    coverage: float | None = None
+    """Share of the surface that is really seen."""
+    mass: float | None = None
+    mass_std: float | None = None
+    density: dict[str, Any] | None = None
+    """Density with its source, and its mean under the content's own weight."""
+    shape: Shape | None = None
+    quality: tuple[Remark, ...] = ()
+    missing: tuple[str, ...] = ()
+    """Lengths of the silo without which there is no volume."""
+    assumed: tuple[str, ...] = ()
+    """What was taken for granted, in words."""
+    lengths: Lengths | None = None
+    timestamp: float | None = None
+    source: str = "frame"
+    config: dict[str, Any] = field(default_factory=dict)
+    timing_ms: dict[str, float] = field(default_factory=dict)
+    surface: SurfaceMap | None = None
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is an answer."""
+        return self.status == "ok"
+
+    @property
+    def fill_fraction(self) -> float | None:
+        """Volume as a share of the capacity."""
+        return None if self.volume is None or not self.capacity else self.volume / self.capacity
+
+    @property
+    def free(self) -> float | None:
+        """Volume that still fits, m³."""
+        return None if self.volume is None or self.capacity is None else self.capacity - self.volume
+
+    def has(self, code: str) -> bool:
+        """Whether a remark of this code is there."""
+        return any(remark.code == code for remark in self.quality)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document of ``siloscope measure --json`` (schema ``siloscope.content/1``)."""
+        return {
+            "schema": SCHEMA,
+            "status": self.status,
+            "reason": self.reason,
+            "message": self.message,
+            "volume_m3": self.volume,
+            "volume_std_m3": self.volume_std,
+            "volume_std_parts_m3": None if self.parts is None else self.parts.to_dict(),
+            "fill_fraction": self.fill_fraction,
+            "free_m3": self.free,
+            "capacity_m3": self.capacity,
+            "capacity_from": self.capacity_from,
+            "level_m": self.level.to_dict(),
+            "height_datum": self.height_datum,
+            "coverage": self.coverage,
+            "mass_kg": self.mass,
+            "mass_std_kg": self.mass_std,
+            "density": self.density,
+            "shape": None if self.shape is None else self.shape.to_dict(),
+            "quality": [remark.to_dict() for remark in self.quality],
+            "missing": list(self.missing),
+            "assumed": list(self.assumed),
+            "silo": None if self.lengths is None else to_plain(self.lengths),
+            "timestamp": self.timestamp,
+            "source": self.source,
+            "config": self.config,
+            "timing_ms": self.timing_ms,
+        }
