@@ -71,7 +71,7 @@ def truth(scene: Scene) -> siloscope.Calibration:
     """A calibration without error."""
     g, pose = scene.silo.geometry, scene.pose
     slope = g.radius / (g.apex - g.cylinder_bottom)
-    values = [pose.r_x, pose.r_y, pose.t_x, pose.t_y, g.radius, slope, g.apex, *scene.sensor.bias]
+    values = [pose.r_x, pose.r_y, pose.t_x, pose.t_y, g.radius, slope, g.apex, *scene.sensor.bias, 0.0, 0.0]
     profile = siloscope.sensors.load("orbbec-astra-s").to_dict()
     return siloscope.Calibration(
         "ok",

@@ -34,9 +34,9 @@ def known(scene: Scene, std: float = 0.0) -> siloscope.Calibration:
     """A calibration with the scene's true pose and geometry, and a standard deviation for all of them."""
     g, pose = scene.silo.geometry, scene.pose
     slope = g.radius / (g.apex - g.cylinder_bottom)
-    values = [pose.r_x, pose.r_y, pose.t_x, pose.t_y, g.radius, slope, g.apex, *scene.sensor.bias]
+    values = [pose.r_x, pose.r_y, pose.t_x, pose.t_y, g.radius, slope, g.apex, *scene.sensor.bias, 0.0, 0.0]
     name = "orbbec-astra-s" if scene.sensor.bias == ASTRA_S.bias else None
-    covariance = np.diag([std**2] * 7 + [0.0] * 3)
+    covariance = np.diag([std**2] * 7 + [0.0] * 5)
     return siloscope.Calibration(
         "ok",
         pose=pose,

@@ -53,7 +53,7 @@ class TestLaws:
         calibration = known(base)
         assert calibration.parameters is not None
         assert calibration.pose is not None
-        lengths = np.array([1, 1, s, s, s, 1, s, 1, 1, 1])
+        lengths = np.array([1, 1, s, s, s, 1, s, 1, 1, 1, 1, 1])
         pose = replace(calibration.pose, t_x=s * calibration.pose.t_x, t_y=s * calibration.pose.t_y)
         g = calibration.silo
         grown = replace(
@@ -73,7 +73,7 @@ class TestLaws:
         frame = made.render().frame()
         calibration = known(made)
         step = 2e-4
-        covariance = np.zeros((10, 10))
+        covariance = np.zeros((12, 12))
         covariance[parameter, parameter] = step**2
         stated = siloscope.measure(frame, replace(calibration, parameter_covariance=covariance)).parts
         assert stated is not None
@@ -242,6 +242,17 @@ class TestTruth:
         content, frame = measured(scene(Feed("tilted", level, tilt=tilt), place=(x, y)))
         assert content.ok, content.message
         assert abs(percent(content, frame)) < 0.15
+
+    def test_an_oval_silo(self) -> None:
+        made = scene(Feed("gaussian", 0.3), defects=Defects(ovality=0.02, ovality_azimuth=0.4))
+        calibration = known(made)
+        assert calibration.parameters is not None
+        values = calibration.parameters.copy()
+        values[10:] = 0.02 * math.cos(0.8), 0.02 * math.sin(0.8)
+        frame = made.render()
+        exact = siloscope.measure(frame.frame(), replace(calibration, parameters=values))
+        truth = frame.true_volume * (1.0 + 0.5 * 0.02**2)
+        assert exact.volume == pytest.approx(truth, abs=1e-3 * made.silo.capacity)
 
 
 class TestClutter:

@@ -19,17 +19,18 @@ use siloscope::content::volume::Kind;
 use siloscope::sensor::{DepthBias, NoiseLaw};
 use siloscope::{Camera, SiloPose, Vec3};
 
-fn vessel([radius, cylinder_bottom, apex, top, outlet_radius, outlet_length]: [f64; 6]) -> Vessel {
-    Vessel { radius, cylinder_bottom, apex, top, outlet_radius, outlet_length }
+/// A silo as Python gives it: radius, cylinder_bottom, apex, top, outlet radius and length, ovality c and s.
+fn vessel([radius, cylinder_bottom, apex, top, outlet_radius, outlet_length, c, s]: [f64; 8]) -> Vessel {
+    Vessel { radius, cylinder_bottom, apex, top, outlet_radius, outlet_length, ovality: [c, s] }
 }
 
 fn noise_law([floor, constant, linear, quadratic, power_factor, power]: [f64; 6]) -> NoiseLaw {
     NoiseLaw { floor, constant, linear, quadratic, power_factor, power }
 }
 
-/// Volume of a silo (radius, cylinder_bottom, apex, top, outlet radius and length) below level planes at heights z.
+/// Volume of a silo (see `vessel`) below level planes at heights z.
 #[pyfunction]
-fn vessel_volume_below(silo: [f64; 6], z: Vec<f64>) -> PyResult<Vec<f64>> {
+fn vessel_volume_below(silo: [f64; 8], z: Vec<f64>) -> PyResult<Vec<f64>> {
     let vessel = vessel(silo);
     vessel.validate().map_err(value_error)?;
     Ok(z.into_iter().map(|z| vessel.volume_below(z)).collect())
@@ -47,7 +48,7 @@ fn content_measure<'py>(
     camera: Option<&Bound<'py, PyAny>>,
     rays: Option<PyReadonlyArray3<'py, f64>>,
     pose: [f64; 4],
-    silo: [f64; 6],
+    silo: [f64; 8],
     covariance: PyReadonlyArray2<'py, f64>,
     wall_std: f64,
     bias: [f64; 3],

@@ -39,6 +39,8 @@ class Knowledge:
     bias: tuple[float, float, float]
     noise: tuple[float, float, float, float, float, float]
     range: tuple[float, float]
+    ovality: tuple[float, float] = (0.0, 0.0)
+    """How oval the silo is, as the calibration has it (`siloscope.surface`)."""
     assumed: tuple[str, ...] = ()
     config: dict[str, Any] = field(default_factory=dict)
 
@@ -81,6 +83,7 @@ def know(
         _bias(calibration, profile),
         profile.noise or TYPICAL_NOISE,
         profile.range,
+        _ovality(calibration),
         tuple(assumed),
         {"sensor": profile.to_dict()},
     )
@@ -137,10 +140,18 @@ def _ranges() -> dict[str, tuple[float, float]]:
 
 def _bias(calibration: Calibration, profile: SensorProfile) -> tuple[float, float, float]:
     """The depth bias that the calibration found, or the profile's."""
-    if calibration.parameters is None or not np.isfinite(calibration.parameters[7:]).all():
+    if calibration.parameters is None or not np.isfinite(calibration.parameters[7:10]).all():
         return profile.bias
-    offset, scale, quadratic = (float(b) for b in calibration.parameters[7:])
+    offset, scale, quadratic = (float(b) for b in calibration.parameters[7:10])
     return offset, scale, quadratic
+
+
+def _ovality(calibration: Calibration) -> tuple[float, float]:
+    """Cosine and sine part of the ovality; 0 where the calibration has none."""
+    known = calibration.parameters
+    if known is None or not np.isfinite(known[10:12]).all() or len(known) < 12:
+        return 0.0, 0.0
+    return float(known[10]), float(known[11])
 
 
 def _covariance(calibration: Calibration, cone_only: bool) -> NDArray[np.float64]:
@@ -162,7 +173,8 @@ def _covariance(calibration: Calibration, cone_only: bool) -> NDArray[np.float64
         jacobian[5, 4:7] = (-1.0 / slope, radius / slope**2, 1.0)
     else:
         jacobian[5, 5] = 0.0
-    made = jacobian @ np.nan_to_num(calibration.parameter_covariance) @ jacobian.T
+    own = np.nan_to_num(calibration.parameter_covariance)[:10, :10]
+    made = jacobian @ own @ jacobian.T
     return np.asarray(0.5 * (made + made.T))
 
 

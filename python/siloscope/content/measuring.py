@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -154,8 +154,7 @@ def _known(
     fused = calibrate([estimate], sensor=profile, diameter=sheet.diameter)
     known = know(fused, profile, sheet, top, None)
     said = ("pose and silo from this frame alone, without a calibration", *known.assumed)
-    return Knowledge(known.pose, known.lengths, known.covariance, known.bias, known.noise, known.range, said,
-                     known.config), fused  # fmt: skip
+    return replace(known, assumed=said), fused
 
 
 def _camera(data: Frame | ArrayLike, camera: Camera | None, calibration: Calibration) -> Camera | None:
@@ -188,7 +187,7 @@ def _run(prepared: Prepared, known: Knowledge, sheet: Datasheet) -> tuple[dict[s
         raise UsageError(str(error)) from None
 
 
-def _silo(known: Knowledge, sheet: Datasheet) -> tuple[float, float, float, float, float, float]:
+def _silo(known: Knowledge, sheet: Datasheet) -> tuple[float, ...]:
     """Lengths as the core takes them; a floor that nobody knows is put out of sight."""
     geometry = known.lengths.geometry
     if geometry.radius is None:
@@ -200,7 +199,8 @@ def _silo(known: Knowledge, sheet: Datasheet) -> tuple[float, float, float, floa
     if bottom is None or apex is None:
         bottom = apex = BOTTOMLESS
     outlet = min(sheet.outlet_diameter / 2.0, 0.9 * geometry.radius)
-    return geometry.radius, bottom, apex, min(known.lengths.top, apex - 1e-3), outlet, sheet.outlet_length
+    top = min(known.lengths.top, apex - 1e-3)
+    return geometry.radius, bottom, apex, top, outlet, sheet.outlet_length, *known.ovality
 
 
 def _content(

@@ -99,7 +99,15 @@ mod tests {
     use proptest::prelude::*;
 
     fn vessel() -> Vessel {
-        Vessel { radius: 1.2, cylinder_bottom: 2.0, apex: 3.4, top: 0.0, outlet_radius: 0.0, outlet_length: 0.0 }
+        Vessel {
+            radius: 1.2,
+            cylinder_bottom: 2.0,
+            apex: 3.4,
+            top: 0.0,
+            outlet_radius: 0.0,
+            outlet_length: 0.0,
+            ovality: [0.0; 2],
+        }
     }
 
     /// A measured point under changed parameters, the floor with it.

@@ -93,7 +93,7 @@ pub struct Content {
 /// Measures the content.
 pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
     setup.vessel.validate()?;
-    let returns = Returns::new(source, setup.bias, &setup.pose)?;
+    let returns = Returns::new(source, setup.bias, &setup.pose, setup.vessel.ovality)?;
     let grid = Grid::over_disc([0.0, 0.0], setup.vessel.radius, returns.len());
     let lever = Lever::new(&setup.pose);
     let (cells, tally) = gather(&returns, &bound(setup), &grid, &setup.noise, &lever);

@@ -30,6 +30,7 @@ pub struct Returns<'a> {
     bias: DepthBias,
     rotation: [[f32; 3]; 3],
     translation: [f32; 2],
+    ovality: [f32; 2],
 }
 
 /// Points of one line of pixels in the silo frame. A depth of 0 is no measurement.
@@ -70,7 +71,9 @@ const CHUNK: usize = 640;
 
 impl<'a> Returns<'a> {
     /// Puts a frame into the silo frame by the camera's pose.
-    pub fn new(source: Source<'a>, bias: DepthBias, pose: &SiloPose) -> Result<Self> {
+    ///
+    /// In an oval silo (`ovality` c, s) x and y are divided by 1 + c cos 2φ + s sin 2φ, which makes its wall round.
+    pub fn new(source: Source<'a>, bias: DepthBias, pose: &SiloPose, ovality: [f64; 2]) -> Result<Self> {
         if let Source::Depth(depth, rays) = source {
             let expected = match rays {
                 Rays::Pinhole(columns, rows) => columns.len() * rows.len(),
@@ -82,7 +85,8 @@ impl<'a> Returns<'a> {
         }
         let r = pose.rotation();
         let rotation = [0, 1, 2].map(|row| [0, 1, 2].map(|column| r[(row, column)] as f32));
-        Ok(Self { source, bias, rotation, translation: [pose.t_x as f32, pose.t_y as f32] })
+        let translation = [pose.t_x as f32, pose.t_y as f32];
+        Ok(Self { source, bias, rotation, translation, ovality: ovality.map(|o| o as f32) })
     }
 
     /// Number of pixels or points, measured or not.
@@ -149,6 +153,20 @@ impl<'a> Returns<'a> {
                 *out = d * (a * u + b * v + c) + shift;
             }
         }
+        self.round(line);
+    }
+
+    /// Makes an oval silo round: cos 2φ = (x² - y²)/r², sin 2φ = 2xy/r².
+    fn round(&self, line: &mut Line) {
+        let [c, s] = self.ovality;
+        if c == 0.0 && s == 0.0 {
+            return;
+        }
+        for (x, y) in line.x.iter_mut().zip(&mut line.y) {
+            let (square, across) = (*x * *x - *y * *y, 2.0 * *x * *y);
+            let oval = 1.0 + (c * square + s * across) / (*x * *x + *y * *y).max(1e-12);
+            (*x, *y) = (*x / oval, *y / oval);
+        }
     }
 
     /// Undoes the sensor's bias; whatever is no depth becomes 0.
@@ -198,7 +216,7 @@ mod tests {
 
     fn all(source: Source<'_>, bias: DepthBias, stride: usize) -> Vec<[f32; 4]> {
         let mut points = Vec::new();
-        let Ok(returns) = Returns::new(source, bias, &POSE) else { panic!("a frame") };
+        let Ok(returns) = Returns::new(source, bias, &POSE, [0.0; 2]) else { panic!("a frame") };
         returns.visit(stride, |l| (0..l.len()).for_each(|i| points.push([l.x[i], l.y[i], l.z[i], l.depth[i]])));
         points
     }
@@ -242,7 +260,8 @@ mod tests {
 
     #[test]
     fn a_depth_of_another_size_is_refused() {
-        let refused = Returns::new(Source::Depth(&[1.0; 5], Rays::Pinhole(&[0.0; 2], &[0.0; 2])), BIAS, &POSE);
+        let refused =
+            Returns::new(Source::Depth(&[1.0; 5], Rays::Pinhole(&[0.0; 2], &[0.0; 2])), BIAS, &POSE, [0.0; 2]);
         assert!(matches!(refused, Err(Error::Shape { what: "depth", got: 5, expected: 4 })));
     }
 }

@@ -112,8 +112,15 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    const VESSEL: Vessel =
-        Vessel { radius: 1.2, cylinder_bottom: 2.0, apex: 3.4, top: -0.1, outlet_radius: 0.0, outlet_length: 0.0 };
+    const VESSEL: Vessel = Vessel {
+        radius: 1.2,
+        cylinder_bottom: 2.0,
+        apex: 3.4,
+        top: -0.1,
+        outlet_radius: 0.0,
+        outlet_length: 0.0,
+        ovality: [0.0; 2],
+    };
     const POSE: SiloPose = SiloPose { r_x: 0.1, r_y: -0.2, t_x: 0.4, t_y: 0.1 };
 
     proptest! {

@@ -20,6 +20,8 @@ pub struct Vessel {
     pub outlet_radius: f64,
     /// How far the outlet pipe's closed end lies below the cone's vertex.
     pub outlet_length: f64,
+    /// Ovality (c, s): the cross-section's radius is larger by the factor 1 + c cos 2φ + s sin 2φ. Lengths are means.
+    pub ovality: [f64; 2],
 }
 
 /// Volume with its derivatives by the lengths of the geometry.
@@ -51,7 +53,14 @@ impl Vessel {
             (0.0..self.radius).contains(&self.outlet_radius),
             "below the radius",
         )?;
-        check("outlet_length", self.outlet_length, (0.0..=1e3).contains(&self.outlet_length), "between 0 and 1000 m")
+        check("outlet_length", self.outlet_length, (0.0..=1e3).contains(&self.outlet_length), "between 0 and 1000 m")?;
+        let oval = self.ovality[0].hypot(self.ovality[1]);
+        check("ovality", oval, oval <= 0.2, "at most 0.2")
+    }
+
+    /// Area of the oval cross-section over that of the circle of the mean radius: the mean of the factor's square.
+    pub fn stretch(&self) -> f64 {
+        1.0 + 0.5 * (self.ovality[0] * self.ovality[0] + self.ovality[1] * self.ovality[1])
     }
 
     /// Height of the cone.
@@ -79,7 +88,7 @@ impl Vessel {
     pub fn volume_below(&self, z: f64) -> f64 {
         let disc = PI * self.radius * self.radius;
         let in_cylinder = disc * (self.cylinder_bottom - z).max(0.0);
-        in_cylinder + self.cone_below(z) + self.pipe_below(z)
+        self.stretch() * (in_cylinder + self.cone_below(z)) + self.pipe_below(z)
     }
 
     /// Volume that the silo holds up to its top.
@@ -112,7 +121,15 @@ mod tests {
     use proptest::prelude::*;
 
     fn vessel() -> Vessel {
-        Vessel { radius: 1.25, cylinder_bottom: 4.5, apex: 5.5, top: 0.0, outlet_radius: 0.0, outlet_length: 0.0 }
+        Vessel {
+            radius: 1.25,
+            cylinder_bottom: 4.5,
+            apex: 5.5,
+            top: 0.0,
+            outlet_radius: 0.0,
+            outlet_length: 0.0,
+            ovality: [0.0; 2],
+        }
     }
 
     /// Volume by thin shells around the axis.
@@ -161,6 +178,7 @@ mod tests {
             let big = Vessel {
                 radius: s * v.radius, cylinder_bottom: s * v.cylinder_bottom, apex: s * v.apex, top: s * v.top,
                 outlet_radius: s * v.outlet_radius, outlet_length: s * v.outlet_length,
+                ..v
             };
             let ratio = big.volume_below(s * z) / (s * s * s);
             prop_assert!((ratio - v.volume_below(z)).abs() < 1e-9 * (1.0 + v.volume_below(z)));

@@ -183,7 +183,7 @@ impl Spoke<'_> {
         for node in GAUSS {
             let r = from + node * (to - from);
             let [x, y] = self.place(r);
-            let ring = 0.5 * (to - from) * r * TAU / SPOKES as f64;
+            let ring = 0.5 * (to - from) * r * TAU / SPOKES as f64 * self.vessel.stretch();
             let row = surface.row(x, y);
             let near = detail::weights(&surface.grid, x, y);
             let extra: f64 = near.iter().map(|&(i, w)| w * surface.detail[i]).sum();
