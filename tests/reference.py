@@ -106,7 +106,7 @@ def shape_tensors(points: Array, neighbours: NDArray[np.intp], normal: Array) ->
 
 
 def select_candidates(
-    points: Array, neighbours: NDArray[np.intp], tensors: ShapeTensors, share: float = 0.5, view: str = "inside"
+    points: Array, neighbours: NDArray[np.intp], tensors: ShapeTensors, share: float = 0.7, view: str = "inside"
 ) -> tuple[NDArray[np.intp], Array]:
     """The `share` with the smallest |k2| of the points that are clearly curved and surrounded: index and E1.
 
@@ -169,14 +169,18 @@ def rotation(X: Array) -> Array:
     return np.array([[cy, sx * sy, cx * sy], [0, cx, -sx], [-sy, sx * cy, cx * cy]])
 
 
-def axis_points(points: Array, normal: Array, X: Array, partners: int = 50) -> Array:
+def axis_points(points: Array, normal: Array, X: Array, partners: int = 100) -> Array:
     """Points where the lines p' + λN' meet the planes π(p, X, N), projected into the plane through the origin (Eq. 4).
 
-    Partners p' are the quarter with the greatest |(N × X)·N'| of 4 `partners` evenly spread candidates.
+    Partners p' are the quarter with the greatest |(N × X)·N'| of 4 `partners` evenly spread candidates; of more than
+    3000 candidates only so many, evenly spread, lend their planes.
     """
-    pool = np.array([i * len(points) // min(4 * partners, len(points)) for i in range(min(4 * partners, len(points)))])
+    pool, planes = (
+        np.array([i * len(points) // n for i in range(n)], dtype=int)
+        for n in (min(4 * partners, len(points)), min(3000, len(points)))
+    )
     estimates = []
-    for p, N in zip(points, normal, strict=True):
+    for p, N in zip(points[planes], normal[planes], strict=True):
         across = np.cross(N, X)
         best = pool[np.argsort(-np.abs(normal[pool] @ across), kind="stable")]
         for j in best[: int(np.ceil(len(pool) / 4))]:

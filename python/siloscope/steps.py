@@ -29,13 +29,13 @@ GRID = 0.05
 NEIGHBOURS = 30
 """Neighbours k of normals and shape tensors (step 2)."""
 
-SHARE = 0.5
+SHARE = 0.7
 """Share of the clearly curved points that are kept as candidates (step 3)."""
 
 AGREEMENT = 2.0
 """Robust standard deviations by which a candidate's E1 may be off the perpendicular to X (step 4)."""
 
-PARTNERS = 50
+PARTNERS = 100
 """Partners s of each candidate (step 5)."""
 
 VIEWS = ("inside", "outside", "either")

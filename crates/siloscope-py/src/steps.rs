@@ -211,8 +211,8 @@ fn axis_direction(e1: Doubles) -> PyResult<([f64; 3], [f64; 3])> {
 fn consistent_direction<'py>(py: Python<'py>, e1: Doubles, agreement: f64) -> PyResult<([f64; 3], Indices<'py>)> {
     let candidate = |(index, e1)| Candidate { index, bent: f64::NAN, straight: f64::NAN, e1 };
     let candidates: Vec<Candidate> = vectors(&e1)?.into_iter().enumerate().map(candidate).collect();
-    let (direction, kept) = axis::consistent_direction(&candidates, agreement);
-    Ok((direction.x.into(), kept.iter().map(|c| c.index as u32).collect::<Vec<_>>().into_pyarray(py)))
+    let found = axis::consistent_direction(&candidates, agreement);
+    Ok((found.direction.x.into(), found.kept.iter().map(|c| c.index as u32).collect::<Vec<_>>().into_pyarray(py)))
 }
 
 /// Estimated axis points (M, 2) in the silo's x and y (Eq. 4).

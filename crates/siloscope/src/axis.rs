@@ -32,29 +32,39 @@ const CLEAREST: f64 = 0.2;
 /// Rounds of leaving out and drawing again; more change nothing.
 const ROUNDS: usize = 5;
 
-/// Direction of the axis, and the candidates that agree with it.
+/// A direction with the candidates that agree with it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Consensus {
+    /// The direction.
+    pub direction: Direction,
+    /// Largest |E1·X| of a candidate that agrees.
+    pub limit: f64,
+    /// The candidates that do.
+    pub kept: Vec<Candidate>,
+}
+
+/// Direction of the axis from the candidates that agree with each other.
 ///
 /// By Property 3 every wall point's E1 is perpendicular to X. Candidates farther from that than `agreement` robust
 /// standard deviations are feed, edges, or spoilt by noise: a handful of them outweighs thousands of good ones.
 /// The direction is drawn from the clearest candidates first and then from all, each time without those. An infinite
 /// `agreement` leaves none out and draws once.
-pub fn consistent_direction(candidates: &[Candidate], agreement: f64) -> (Direction, Vec<Candidate>) {
-    if agreement.is_infinite() {
-        return (direction_of(candidates), candidates.to_vec());
-    }
-    let clearest = (CLEAREST * candidates.len() as f64).ceil() as usize;
-    let mut kept = candidates[..clearest].to_vec();
-    let mut limit = f64::INFINITY;
-    for round in 0..2 * ROUNDS {
-        let x = direction_of(&kept).x;
-        let off = |c: &Candidate| c.e1.dot(&x).abs();
-        if round < ROUNDS {
-            limit = agreement * 1.4826 * median(kept.iter().map(off).collect()).unwrap_or(0.0) + f64::EPSILON;
+pub fn consistent_direction(candidates: &[Candidate], agreement: f64) -> Consensus {
+    let (mut kept, mut limit) = (candidates.to_vec(), f64::INFINITY);
+    if agreement.is_finite() {
+        let clearest = (CLEAREST * candidates.len() as f64).ceil() as usize;
+        kept.truncate(clearest);
+        for round in 0..2 * ROUNDS {
+            let x = direction_of(&kept).x;
+            let off = |c: &Candidate| c.e1.dot(&x).abs();
+            if round < ROUNDS {
+                limit = agreement * 1.4826 * median(kept.iter().map(off).collect()).unwrap_or(0.0) + f64::EPSILON;
+            }
+            let among = if round < ROUNDS - 1 { clearest } else { candidates.len() };
+            kept = candidates[..among].iter().filter(|c| off(c) <= limit).copied().collect();
         }
-        let among = if round < ROUNDS - 1 { clearest } else { candidates.len() };
-        kept = candidates[..among].iter().filter(|c| off(c) <= limit).copied().collect();
     }
-    (direction_of(&kept), kept)
+    Consensus { direction: direction_of(&kept), limit, kept }
 }
 
 fn direction_of(candidates: &[Candidate]) -> Direction {
@@ -88,14 +98,15 @@ pub struct AxisPoint {
 /// given. With walls in order of |k2|, neither turning nor mirroring the scene changes anything.
 ///
 /// Seen along X, planes and lines are all lines in two dimensions, and that is where they are met.
+/// Of more than `PLANES` walls only so many, evenly spread, lend their planes: neighbours' planes say the same.
 pub fn axis_points(walls: &[Wall], x: &Vec3, partners: usize, workers: &Workers) -> Vec<AxisPoint> {
     let turn = SiloPose::from_axis(x, &Vec3::zeros()).rotation();
     let seen: Vec<[Vector2<f64>; 2]> = walls.iter().map(|w| [w.p, w.normal].map(|v| (turn * v).xy())).collect();
-    let pool = spread_evenly(walls.len(), 4 * partners);
+    let (planes, pool) = (spread_evenly(walls.len(), PLANES), spread_evenly(walls.len(), 4 * partners));
     let quartile = pool.len().div_ceil(4);
-    let mut estimates = vec![AxisPoint::default(); walls.len() * quartile];
+    let mut estimates = vec![AxisPoint::default(); planes.len() * quartile];
     workers.for_parts(&mut estimates, quartile, |i, found| {
-        let [p, normal] = seen[i];
+        let [p, normal] = seen[planes[i] as usize];
         let across = Vector2::new(normal.y, -normal.x); // N × X
         let rank = |j: &u32| (-across.dot(&seen[*j as usize][1]).abs(), *j);
         let mut ranked: Vec<(f64, u32)> = pool.iter().map(rank).collect();
@@ -103,12 +114,15 @@ pub fn axis_points(walls: &[Wall], x: &Vec3, partners: usize, workers: &Workers)
         for (estimate, (_, j)) in found.iter_mut().zip(ranked) {
             let [other, line] = seen[j as usize];
             let lambda = (p - other).dot(&across) / line.dot(&across);
-            *estimate = AxisPoint { at: other + line * lambda, plane: i as u32, line: j };
+            *estimate = AxisPoint { at: other + line * lambda, plane: planes[i], line: j };
         }
     });
     estimates.retain(|estimate| estimate.at.iter().all(|c| c.is_finite()));
     estimates
 }
+
+/// Most planes that are met.
+const PLANES: usize = 3000;
 
 /// Up to `m` numbers below n, evenly spread.
 fn spread_evenly(n: usize, m: usize) -> Vec<u32> {

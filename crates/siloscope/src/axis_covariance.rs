@@ -10,13 +10,13 @@ use crate::refusal::Refusal;
 use crate::{SiloPose, Vec3};
 use nalgebra::{Matrix2, Matrix4, Matrix4x2, Vector2};
 
-/// Blocks that touch are not quite independent: measured against the true errors of simulated frames
-/// (docs/design/choices-shape-tensor.md).
-const TOUCHING: f64 = 1.5;
 /// Fewest blocks that tell a scatter.
 const LEAST_BLOCKS: usize = 6;
 /// Largest standard deviation of the direction that still is an answer, radians.
 const MOST_TILT: f64 = 0.05;
+
+/// How near the limit is at the limit, as a share of it.
+const EDGE: f64 = 0.25;
 
 /// What the covariance is drawn from.
 pub struct Scatter<'a> {
@@ -32,14 +32,16 @@ pub struct Scatter<'a> {
     pub blocks: usize,
     /// Mean z of the walls in the silo frame: there, direction and position of the axis are independent.
     pub height: f64,
-    /// Robust standard deviations beyond which candidates were left out.
-    pub agreement: f64,
+    /// E1 of all candidates, in the silo frame.
+    pub candidates: &'a [Vec3],
+    /// Largest |E1·X| of the walls among them.
+    pub limit: f64,
 }
 
 impl Scatter<'_> {
     /// Covariance of r_x, r_y, t_x and t_y; none where the direction is hardly determined.
     pub fn covariance(&self) -> Result<Matrix4<f64>, Refusal> {
-        let covariance = self.sandwiches() * TOUCHING;
+        let covariance = self.sandwiches();
         let std = covariance.diagonal().map(f64::sqrt);
         let determined = self.blocks >= LEAST_BLOCKS && std.x < MOST_TILT && std.y < MOST_TILT;
         if determined { Ok(covariance) } else { Err(Refusal::PoorlyDetermined) }
@@ -54,11 +56,20 @@ impl Scatter<'_> {
         tilt * self.of_tilt() * tilt.transpose() + shift * self.of_point() * shift.transpose()
     }
 
-    /// The tilt solves Σ e (e·δ + E1·X) = 0 with e the part of E1 across the axis.
+    /// The tilt solves Σ e (e·δ + E1·X) = 0 over the walls, e being the part of E1 across the axis.
     fn of_tilt(&self) -> Matrix2<f64> {
-        let bread: Matrix2<f64> = self.e1.iter().map(|e| e.xy() * e.xy().transpose()).sum();
+        let square = |e: &Vec3| e.xy() * e.xy().transpose();
+        let walls: Matrix2<f64> = self.e1.iter().map(square).sum();
         let scores = self.block.iter().zip(self.e1).map(|(block, e)| (*block, (e.xy() * e.z).into()));
-        self.sandwich(&bread, sums(scores, self.blocks)) * trimming(self.agreement).powi(2)
+        self.sandwich(&(walls - self.hold_lost()), sums(scores, self.blocks))
+    }
+
+    /// What leaving candidates out costs: those that enter and leave at the limit as X turns weaken its hold by the
+    /// limit times their density there. Where they are as dense as anywhere else, any direction would hold itself.
+    fn hold_lost(&self) -> Matrix2<f64> {
+        let near = |e: &&Vec3| (e.z.abs() - self.limit).abs() < EDGE * self.limit;
+        let at_limit: Matrix2<f64> = self.candidates.iter().filter(near).map(|e| e.xy() * e.xy().transpose()).sum();
+        at_limit / (2.0 * EDGE)
     }
 
     /// Each coordinate solves Σ sign(x_i − median) = 0, whose slope is the density of the estimates at the median.
@@ -79,22 +90,10 @@ impl Scatter<'_> {
     fn sandwich(&self, bread: &Matrix2<f64>, scores: Vec<[f64; 2]>) -> Matrix2<f64> {
         let meat: Matrix2<f64> = scores.into_iter().map(Vector2::from).map(|s| s * s.transpose()).sum();
         let few = self.blocks as f64 / (self.blocks as f64 - 2.0).max(0.0);
-        let inverse = bread.try_inverse().unwrap_or_else(|| Matrix2::repeat(f64::INFINITY));
+        let holds = bread.m11 > 0.0 && bread.determinant() > 0.0;
+        let inverse = bread.try_inverse().filter(|_| holds).unwrap_or_else(|| Matrix2::repeat(f64::INFINITY));
         inverse * meat * inverse * few
     }
-}
-
-/// What leaving out beyond c standard deviations costs: candidates that enter and leave as X turns weaken its hold by
-/// P(|x| < c) / (P(|x| < c) − 2c φ(c)) for normally distributed x.
-fn trimming(c: f64) -> f64 {
-    if c.is_infinite() {
-        return 1.0;
-    }
-    let density = |x: f64| (-0.5 * x * x).exp() / std::f64::consts::TAU.sqrt();
-    let steps = 200;
-    let inside: f64 = (0..steps).map(|i| density((f64::from(i) + 0.5) / f64::from(steps) * c)).sum::<f64>() * 2.0 * c
-        / f64::from(steps);
-    inside / (inside - 2.0 * c * density(c))
 }
 
 fn quantiles<const N: usize>(mut values: Vec<f64>, at: [f64; N]) -> [f64; N] {

@@ -12,14 +12,26 @@ pub struct Coverage {
     pub pixels: [f64; 5],
     /// Surface with each label.
     pub areas: [f64; 5],
+    /// Number of pixels that see clearly behind the wall, where nothing can be.
+    pub behind: f64,
+    /// Pixels that look towards the cone's vertex, and those of them that see something before it.
+    pub apex: [f64; 2],
 }
 
 impl Coverage {
-    /// Share of the pixels that lie behind the wall, where nothing can be.
-    pub fn behind(&self) -> f64 {
-        self.pixels[OTHER as usize] / self.pixels.iter().sum::<f64>().max(1.0)
+    /// Whether something lies before the cone all around its vertex: then the cone is no surface of feed.
+    pub fn is_apex_covered(&self) -> bool {
+        self.apex[1] > 0.7 * self.apex[0]
+    }
+
+    /// Share of the pixels that see clearly behind the wall.
+    pub fn share_behind(&self) -> f64 {
+        self.behind / self.pixels.iter().sum::<f64>().max(1.0)
     }
 }
+
+/// How near the axis is near the vertex, as a share of the silo's size.
+const APEX: f64 = 0.15;
 
 /// Labels voxels and adds up what their pixels cover.
 ///
@@ -30,6 +42,7 @@ pub fn coverage(cloud: &Cloud, normals: &[Vec3], pose: &SiloPose, profile: &Prof
     let turn = pose.rotation();
     let shift = Vec3::new(pose.t_x, pose.t_y, 0.0);
     let mut seen = Coverage::default();
+    let reach = APEX * profile.size();
     for ((p, normal), count) in cloud.points.iter().zip(normals).zip(&cloud.counts) {
         let placed = turn * p + shift;
         let rho = placed.x.hypot(placed.y);
@@ -40,6 +53,11 @@ pub fn coverage(cloud: &Cloud, normals: &[Vec3], pose: &SiloPose, profile: &Prof
             _ => normal.dot(p),
         };
         let pixels = f64::from(*count);
+        seen.behind += if off > 0.05 * rho + tolerance { pixels } else { 0.0 };
+        if rho < reach && profile.is_cone(placed.z) {
+            seen.apex[0] += pixels;
+            seen.apex[1] += if off < -0.02 * reach - tolerance { pixels } else { 0.0 };
+        }
         seen.pixels[label as usize] += pixels;
         seen.areas[label as usize] += pixels * p.z.powi(3) / facing.abs().max(0.02 * p.norm());
     }

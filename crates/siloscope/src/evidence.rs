@@ -81,7 +81,7 @@ const TURN: std::ops::Range<f64> = 0.8..1.25;
 const MOST_ALONG: f64 = 0.12;
 const MOST_BEND: f64 = 0.06;
 /// Largest share of pixels behind the wall.
-const MOST_BEHIND: f64 = 0.05;
+const MOST_BEHIND: f64 = 0.02;
 
 impl Evidence {
     /// Measures it; `counts` are those of points and candidates, `spread` is that of step 4.

@@ -178,6 +178,7 @@ impl Hasher for KeyHasher {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use crate::{Camera, Distortion};

@@ -1,16 +1,16 @@
 //! The paper's six steps from a depth frame to the silo's axis (section 2.3). Read this page first.
 
-use crate::axis::{AxisPoint, Direction, Wall, axis_point, axis_points, consistent_direction};
+use crate::axis::{AxisPoint, Consensus, Wall, axis_point, axis_points, consistent_direction};
 use crate::axis_covariance::Scatter;
 use crate::backproject::DepthImage;
 use crate::blocks::blocks;
-use crate::candidates::{View, select_candidates};
+use crate::candidates::{Candidate, View, select_candidates};
 use crate::coverage::{Coverage, coverage};
-use crate::evidence::{Evidence, PlacedWall, placed_walls};
+use crate::evidence::{Evidence, placed_walls};
 use crate::grid::{Cloud, voxel_grid, voxel_grid_of_image};
 use crate::neighbours::{Neighbours, nearest_neighbours};
 use crate::normals::normals;
-use crate::profile::{Place, Profile, fit_profile};
+use crate::profile::{Profile, fit_profile};
 use crate::refusal::Refusal;
 use crate::shape_tensor::{ShapeTensor, shape_tensors};
 use crate::workers::Workers;
@@ -39,7 +39,7 @@ pub struct Settings {
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { grid: 0.05, neighbours: 30, view: None, share: 0.5, agreement: 2.0, partners: 50, threads: 1 }
+        Self { grid: 0.05, neighbours: 30, view: None, share: 0.7, agreement: 2.0, partners: 100, threads: 1 }
     }
 }
 
@@ -76,7 +76,7 @@ pub fn locate_in_points(points: &[Vec3], settings: &Settings) -> Result<Outcome>
     let (workers, mut clock) = (Workers::new(settings.threads), Clock::start());
     let cloud = voxel_grid(points, settings.grid, &workers)?; // step 1
     clock.lap("points");
-    locate_in_grid(cloud, &[View::Inside, View::Outside, View::Either], settings, &workers, clock)
+    locate_in_grid(cloud, &[View::Inside, View::Either, View::Outside], settings, &workers, clock)
 }
 
 /// What steps 1 and 2 make of a frame.
@@ -121,16 +121,16 @@ fn axis_seen_from(view: View, surface: &Surface, settings: &Settings, workers: &
     let points = &cloud.points;
     let candidates = select_candidates(points, near, tensors, settings.share, view); // step 3
     clock.lap("candidates");
-    let (direction, kept) = consistent_direction(&candidates, settings.agreement); // step 4, Eq. 3
+    let consensus = consistent_direction(&candidates, settings.agreement); // step 4, Eq. 3
     clock.lap("direction");
-    let walls: Vec<Wall> = kept.iter().map(|c| Wall { p: points[c.index], normal: normals[c.index] }).collect();
-    let estimates = axis_points(&walls, &direction.x, settings.partners, workers); // step 5, Eq. 4
+    let wall = |c: &Candidate| Wall { p: points[c.index], normal: normals[c.index] };
+    let walls: Vec<Wall> = consensus.kept.iter().map(wall).collect();
+    let x = consensus.direction.x;
+    let estimates = axis_points(&walls, &x, settings.partners, workers); // step 5, Eq. 4
     let a = axis_point(&estimates).ok_or(Refusal::NoWall)?;
     clock.lap("point");
-    let pose = SiloPose { t_x: -a.x, t_y: -a.y, ..SiloPose::from_axis(&direction.x, &Vec3::zeros()) }; // step 6, Eqs. 6, 7
-    let walls = placed_walls(&kept, points, normals, &pose);
-    let found = Found { pose, view, direction, estimates, candidates: candidates.len() };
-    let outcome = assess(surface, &walls, &found, settings);
+    let pose = SiloPose { t_x: -a.x, t_y: -a.y, ..SiloPose::from_axis(&x, &Vec3::zeros()) }; // step 6, Eqs. 6, 7
+    let outcome = assess(surface, &Found { pose, view, candidates, consensus, estimates }, settings);
     clock.lap("evidence");
     outcome
 }
@@ -139,24 +139,34 @@ fn axis_seen_from(view: View, surface: &Surface, settings: &Settings, workers: &
 struct Found {
     pose: SiloPose,
     view: View,
-    direction: Direction,
+    candidates: Vec<Candidate>,
+    consensus: Consensus,
     estimates: Vec<AxisPoint>,
-    candidates: usize,
 }
 
 /// What the paper leaves out: how sure the answer is, whether to give it, and what the frame shows.
-fn assess(surface: &Surface, walls: &[PlacedWall], found: &Found, settings: &Settings) -> Outcome {
+fn assess(surface: &Surface, found: &Found, settings: &Settings) -> Outcome {
+    let walls = placed_walls(&found.consensus.kept, &surface.cloud.points, &surface.normals, &found.pose);
     let side = BLOCK * settings.grid * (settings.neighbours as f64).sqrt();
-    let (block, blocks) = blocks(walls.iter().map(|w| w.p), side);
-    let place = |(w, block): (&PlacedWall, &usize)| Place { rho: w.rho(), z: w.p.z, angle: w.angle(), block: *block };
-    let places: Vec<Place> = walls.iter().zip(&block).map(place).collect();
-    let profile = fit_profile(&places, blocks);
-    let (cloud, normals) = (&surface.cloud, &surface.normals);
-    let coverage = coverage(cloud, normals, &found.pose, &profile, 3.0 * profile.misfit + 0.5 * settings.grid);
-    let counts = [cloud.points.len(), found.candidates];
-    let evidence = Evidence::of(walls, counts, found.direction.spread, coverage.behind());
+    let mut profile = fit_profile(&surface.cloud.points, &surface.normals, &found.pose, side);
+    let see = |profile: &Profile| {
+        let tolerance = 4.0 * profile.misfit + 0.25 * settings.grid;
+        coverage(&surface.cloud, &surface.normals, &found.pose, profile, tolerance)
+    };
+    let mut coverage = see(&profile);
+    if profile.cone_may_be_feed() && !coverage.is_apex_covered() {
+        profile = Profile { cone: None, ..profile };
+        if profile.radius.is_none() {
+            return Err(Refusal::ConeMayBeFeed);
+        }
+        coverage = see(&profile);
+    }
+    let counts = [surface.cloud.points.len(), found.candidates.len()];
+    let evidence = Evidence::of(&walls, counts, found.consensus.direction.spread, coverage.share_behind());
     evidence.judge(found.view)?;
     profile.judge(&found.pose, found.view)?;
+    let (block, blocks) = blocks(walls.iter().map(|w| w.p), side);
+    let turn = found.pose.rotation();
     let scatter = Scatter {
         pose: &found.pose,
         e1: &walls.iter().map(|w| w.e1).collect::<Vec<_>>(),
@@ -164,7 +174,8 @@ fn assess(surface: &Surface, walls: &[PlacedWall], found: &Found, settings: &Set
         block: &block,
         blocks,
         height: walls.iter().map(|w| w.p.z).sum::<f64>() / walls.len() as f64,
-        agreement: settings.agreement,
+        candidates: &found.candidates.iter().map(|c| turn * c.e1).collect::<Vec<_>>(),
+        limit: found.consensus.limit,
     };
     let covariance = scatter.covariance()?;
     Ok(Located { pose: found.pose, covariance, profile, coverage, evidence, timing: Vec::new() })

@@ -1,12 +1,12 @@
 //! The silo's profile about a known axis: the cylinder's radius and the cone, as far as walls are seen.
 
-use crate::SiloPose;
 use crate::axis::median;
-use crate::blocks::sums;
+use crate::blocks::{blocks, sums};
 use crate::candidates::View;
 use crate::coarse::FEED_SLOPE;
 use crate::refusal::Refusal;
 use crate::surface::Cone;
+use crate::{SiloPose, Vec3};
 use nalgebra::{Matrix2, Vector2};
 
 /// A wall point in the profile.
@@ -37,8 +37,10 @@ pub struct Profile {
     pub misfit: f64,
 }
 
-/// Places that propose parts, and places that judge the proposals: enough of either, and no more time than a step.
-const PROPOSERS: usize = 48;
+/// Places that the profile rests on, that propose parts, and that judge the proposals: enough of each, and no more
+/// time than a step takes.
+const PLACES: usize = 4000;
+const PROPOSERS: usize = 64;
 const JUDGES: usize = 240;
 /// How far a wall's normal may be off its part's, radians: far walls are rough.
 const ANGLE: f64 = 0.25;
@@ -46,24 +48,40 @@ const ANGLE: f64 = 0.25;
 const REACH: f64 = 0.04;
 /// Slopes m of cones that hold feed and let it out.
 const SLOPES: std::ops::RangeInclusive<f64> = 0.1..=5.0;
-/// Share of the walls that a part must have to be one.
-const LEAST: f64 = 0.03;
+/// Share of the places that a part must have to be one.
+const LEAST: f64 = 0.02;
 
-/// Fits cylinder and cone to the walls.
+/// Fits cylinder and cone to a cloud with its normals, given the pose; blocks of side `side` tell how sure they are.
 ///
-/// Places and pairs of places propose parts; the profile that most places agree with is refined by least squares with
-/// Tukey's weights.
-pub fn fit_profile(places: &[Place], blocks: usize) -> Profile {
-    let judges = thinned(places, JUDGES);
+/// Points whose normals meet the axis and pairs of them propose parts; the profile that most points agree with is
+/// refined by least squares with Tukey's weights. Feed may be among the points: it is outvoted, or no wall.
+pub fn fit_profile(points: &[Vec3], normals: &[Vec3], pose: &SiloPose, side: f64) -> Profile {
+    let (places, blocks) = places(points, normals, pose, side);
+    let judges = thinned(&places, JUDGES);
     let Some(scale) = median(judges.iter().map(|p| p.rho).collect()) else { return Profile::default() };
     let mut profile = proposed(&judges, REACH * scale);
     profile.misfit = REACH * scale;
     for _ in 0..10 {
-        profile.refine(places);
+        profile.refine(&places);
     }
-    profile.drop_small_parts(places);
-    profile.add_deviations(places, blocks);
+    profile.drop_small_parts(&places);
+    profile.add_deviations(&places, blocks);
     profile
+}
+
+/// The points whose normals meet the axis, as places of the profile.
+fn places(points: &[Vec3], normals: &[Vec3], pose: &SiloPose, side: f64) -> (Vec<Place>, usize) {
+    let turn = pose.rotation();
+    let step = points.len().div_ceil(PLACES).max(1);
+    let placed = points.iter().zip(normals).step_by(step).map(|(p, normal)| (pose.to_silo(p), turn * normal));
+    let meets_axis = |(p, n): &(Vec3, Vec3)| (p.x * n.y - p.y * n.x).abs() < ANGLE * p.xy().norm() * n.xy().norm();
+    let placed: Vec<_> = placed.filter(meets_axis).collect();
+    let (block, blocks) = blocks(placed.iter().map(|(p, _)| *p), side);
+    let place = |((p, n), block): (&(Vec3, Vec3), usize)| {
+        let rho = p.xy().norm();
+        Place { rho, z: p.z, angle: (n.z * rho / p.xy().dot(&n.xy())).atan(), block }
+    };
+    (placed.iter().zip(block).map(place).collect(), blocks)
 }
 
 fn thinned(places: &[Place], n: usize) -> Vec<Place> {
@@ -137,7 +155,17 @@ impl Profile {
         }
     }
 
-    /// Whether there is a wall at all, no cone that may be feed, and the camera on the side from which it was seen.
+    /// A length that tells how large the silo is: its radius, or the cone's halfway to the camera's height.
+    pub fn size(&self) -> f64 {
+        self.radius.or(self.cone.map(|cone| 0.5 * cone.slope * cone.apex.abs())).unwrap_or(0.0)
+    }
+
+    /// Whether the cone lies as flat as feed does.
+    pub fn cone_may_be_feed(&self) -> bool {
+        self.cone.is_some_and(|cone| cone.slope > FEED_SLOPE)
+    }
+
+    /// Whether there is a wall at all, and the camera on the side from which it was seen.
     pub fn judge(&self, pose: &SiloPose, view: View) -> Result<(), Refusal> {
         let inside = self.distance(pose.t_x.hypot(pose.t_y), 0.0).0 < 0.0;
         let possible = match view {
@@ -145,12 +173,7 @@ impl Profile {
             View::Inside => inside,
             View::Outside => self.radius.is_some() && !inside,
         };
-        let feed = self.radius.is_none() && self.cone.is_some_and(|cone| cone.slope > FEED_SLOPE);
-        match (possible, feed) {
-            (false, _) => Err(Refusal::NoWall),
-            (true, true) => Err(Refusal::ConeMayBeFeed),
-            (true, false) => Ok(()),
-        }
+        if possible { Ok(()) } else { Err(Refusal::NoWall) }
     }
 
     /// Whether a height belongs to the cone.

@@ -156,6 +156,7 @@ fn add<const N: usize>(sums: &mut [f64; N], terms: [f64; N]) {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use proptest::prelude::*;
