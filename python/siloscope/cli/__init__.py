@@ -36,6 +36,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("info", "info:info", "Show what is inside a recording, image, array, cloud or folder."),
     Command("convert", "convert:convert", "Extract frames with their camera, times, gravity and provenance."),
     Command("live", "live:live", "Locate continuously from a camera being mounted, with a hint which way to turn it."),
+    Command("measure", "measure:measure", "Measure what is in the silo: level, volume, fill, mass."),
     Command("reproduce", "reproduce:reproduce", "Repeat the paper's tables and figures, ours beside theirs."),
     Command("simulate", "simulate:simulate", "Write depth frames of a simulated silo, with their exact truth."),
 )
