@@ -11,6 +11,7 @@ from siloscope.estimate import Estimate, Ratios, SiloGeometry
 from siloscope.frame import Frame
 from siloscope.locate import locate
 from siloscope.pose import SiloPose
+from siloscope.track import Track, track
 
 __all__ = [
     "Calibration",
@@ -24,6 +25,7 @@ __all__ = [
     "SiloPose",
     "SiloscopeError",
     "SurfaceMap",
+    "Track",
     "UsageError",
     "__version__",
     "calibrate",
@@ -31,5 +33,6 @@ __all__ = [
     "locate",
     "measure",
     "surface_map",
+    "track",
     "volume_between",
 ]

@@ -1,84 +1,167 @@
-"""``siloscope measure``: one frame and a calibration in, the content out."""
+"""``siloscope measure``: one frame in, the content out."""
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+from rich.console import Console
+from rich.table import Table
 
 import siloscope
 from siloscope.cli import options
-from siloscope.cli.outcome import REFUSED, print_json
-from siloscope.content.result import Content
+from siloscope.cli.outcome import REFUSED, print_json, writing
+from siloscope.cli.progress import say
+from siloscope.cli.summary import with_std
+from siloscope.content import Content
+from siloscope.frame import Frame
+
+CalibrationFile = Annotated[
+    Path | None, typer.Option("--calibration", metavar="FILE", help="What `calibrate` wrote: pose and geometry.")
+]
+Cylinder = Annotated[
+    float | None, typer.Option("--cylinder", metavar="M", help="Height of the cylinder by the datasheet.")
+]
+Cone = Annotated[float | None, typer.Option("--cone", metavar="M", help="Height of the cone by the datasheet.")]
+Top = Annotated[
+    float | None, typer.Option("--top", metavar="M", help="Upper edge below the camera (negative: above it).")
+]
+OutletDiameter = Annotated[float, typer.Option(metavar="M", help="Diameter of an outlet pipe below the cone.")]
+OutletLength = Annotated[float, typer.Option(metavar="M", help="Its length below the cone's vertex.")]
+Strapping = Annotated[
+    Path | None, typer.Option("--strapping", metavar="CSV", help="Strapping table: height (m), volume (m³).")
+]
+DensityNumber = Annotated[float | None, typer.Option("--density", metavar="KG_M3", help="Bulk density, for the mass.")]
+DensityStd = Annotated[float | None, typer.Option(metavar="KG_M3", help="Its standard deviation.")]
+Product = Annotated[
+    str | None, typer.Option("--product", metavar="NAME|TOML", help="Product whose density to take, such as wheat.")
+]
 
 
 def measure(
     file: Annotated[Path, typer.Argument(metavar="FRAME", help="Depth image, depth array, point cloud or recording.")],
-    calibration: Annotated[
-        Path | None, typer.Option("--calibration", "-c", help="What `siloscope calibrate` wrote for this silo.")
-    ] = None,
+    calibration: CalibrationFile = None,
     camera: options.CameraFile = None,
     sensor: options.Sensor = None,
     depth_unit: options.DepthUnit = None,
     diameter: options.Diameter = None,
-    cylinder: Annotated[float | None, typer.Option(help="Datasheet: height of the cylinder, m.")] = None,
-    cone: Annotated[float | None, typer.Option(help="Datasheet: height of the cone, m.")] = None,
-    strapping: Annotated[Path | None, typer.Option(help="Strapping table, CSV of height and volume.")] = None,
-    density: Annotated[float | None, typer.Option(help="Bulk density, kg/m³.")] = None,
-    product: Annotated[str | None, typer.Option(help="Product of the density table, or a TOML file.")] = None,
+    cylinder: Cylinder = None,
+    cone: Cone = None,
+    top: Top = None,
+    outlet_diameter: OutletDiameter = 0.0,
+    outlet_length: OutletLength = 0.0,
+    strapping: Strapping = None,
+    density: DensityNumber = None,
+    density_std: DensityStd = None,
+    product: Product = None,
+    previous: Annotated[
+        Path | None, typer.Option(metavar="FRAME", help="The frame before, to see whether the content moves.")
+    ] = None,
+    mask: Annotated[Path | None, typer.Option(help="Image or .npy, not 0 where the silo is.")] = None,
     number: Annotated[int, typer.Option("--frame", min=0, help="Which frame of several, from 0.")] = 0,
     stream: options.Stream = None,
+    out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write the JSON, the map and pictures here.")] = None,
     as_json: options.AsJson = False,
 ) -> int:
-    """Measure what is in the silo: level, volume, fill and mass, each with its standard deviation.
+    """Measure what is in the silo: level, volume, fill and mass, each with its deviation.
 
-    [bold]Example:[/bold] siloscope measure frame.png --calibration silo7.json --density 650 --json
+    [bold]Example:[/bold] siloscope measure frame.png --calibration silo7.json --product wheat --out reading
 
-    Without a calibration the frame itself has to show the silo; the answer says what was assumed. Exit code 4: the
-    frame does not show enough for an answer, which then says why.
+    Without --calibration the frame itself must show enough wall. Exit code 4: the frame was read well, but gives no
+    trustworthy answer; the JSON says why.
     """
-    with siloscope.frames.open(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
-        frame = options.one_frame(source, number)
-    content = siloscope.measure(
-        frame,
-        calibration,
-        sensor=sensor,
-        diameter=diameter,
-        cylinder=cylinder,
-        cone=cone,
-        strapping=strapping,
-        density=density,
-        product=product,
-    )
+    settings: dict[str, Any] = {
+        "sensor": sensor,
+        "diameter": diameter,
+        "cylinder": cylinder,
+        "cone": cone,
+        "top": top,
+        "outlet_diameter": outlet_diameter,
+        "outlet_length": outlet_length,
+        "strapping": strapping,
+        "density": density,
+        "density_std": density_std,
+        "product": product,
+    }
+    place = {"camera": camera, "depth_unit": depth_unit, "stream": stream}
+    frame = _frame(file, number, place)
+    silo = None if calibration is None else siloscope.Calibration.load(calibration)
+    before = None if previous is None else siloscope.measure(_frame(previous, 0, place), silo, **settings)
+    chosen = None if mask is None else _mask(mask, frame)
+    content = siloscope.measure(frame, silo, mask=chosen, previous=before, **settings)
+    return _answer(content, out, as_json)
+
+
+def _frame(file: Path, number: int, place: dict[str, Any]) -> Frame:
+    with siloscope.frames.open(file, **place) as source:
+        return options.one_frame(source, number)
+
+
+def _mask(mask: Path, frame: Frame) -> Any:
+    from siloscope import region
+
+    shape = frame.points.shape[:-1] if frame.points is not None else frame.depth.shape  # type: ignore[union-attr]
+    return region.read_mask(mask, shape)
+
+
+def _answer(content: Content, out: Path | None, as_json: bool) -> int:
+    if out is not None:
+        from siloscope.content.files import write_content
+
+        with writing(out):
+            written = write_content(out, content)
+        say(f"wrote {len(written)} files to {out}")
     if as_json:
         print_json(content.to_dict())
     else:
-        _print(content)
+        print_content(content)
     return 0 if content.ok else REFUSED
 
 
-def _print(content: Content) -> None:
-    """The answer for people: metres, tonnes and per cent."""
+def print_content(content: Content) -> None:
+    """A short table on stdout, remarks on stderr."""
+    console = Console(highlight=False, soft_wrap=True)
     if not content.ok:
-        print(f"{content.source}: no answer ({content.reason}). {content.message}")
+        console.print(f"[bold yellow]refused[/] {content.source}: {content.reason}", markup=True)
+        console.print(content.message or "", markup=False)
         return
-    rows = [
-        ("volume", _with_std(content.volume, content.volume_std, "m³")),
-        ("fill", "not known" if content.fill_fraction is None else f"{100 * content.fill_fraction:.1f} %"),
-        ("level (mean)", _with_std(content.level.mean, None, "m")),
-        ("mass", _with_std(content.mass, content.mass_std, "kg")),
-        ("surface seen", "not known" if content.coverage is None else f"{100 * content.coverage:.0f} %"),
-    ]
-    for name, value in rows:
-        print(f"{name:14s} {value}")
+    console.print(f"[bold green]ok[/]      {content.source}", markup=True)
+    table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
+    table.add_column(style="bold")
+    table.add_column(justify="right")
+    table.add_column(style="dim")
+    for row in _rows(content):
+        table.add_row(*row)
+    console.print(table)
+    for line in content.assumed:
+        say(f"assumed: {line}")
     for remark in content.quality:
-        print(f"note: {remark.code}")
-    for assumed in content.assumed:
-        print(f"assumed: {assumed}")
+        say(f"{remark.code}: {remark.message} ({remark.seen}); {remark.advice}")
 
 
-def _with_std(value: float | None, std: float | None, unit: str) -> str:
-    if value is None:
-        return "not known"
-    return f"{value:.2f} {unit}" if std is None else f"{value:.2f} ± {std:.2f} {unit}"
+def _rows(content: Content) -> list[tuple[str, str, str]]:
+    """What a person wants to read, line by line."""
+    level = content.level
+    datum = "over the cone's vertex" if content.height_datum == "cone-vertex" else "over the lowest point seen"
+    rows = [("volume", _volume(content), "")]
+    if content.fill_fraction is not None and content.free is not None:
+        rows.append(("fill", f"{100 * content.fill_fraction:.1f} %", f"{content.free:.2f} m³ free"))
+    if content.mass is not None:
+        name = (content.density or {}).get("name", "")
+        rows.append(("mass", with_std(content.mass, content.mass_std, 1.0, " kg"), name))
+    spread = "" if level.min is None or level.max is None else f"{level.min:.2f} to {level.max:.2f} m, "
+    rows.append(("level", with_std(level.mean, level.std, 1.0, " m"), f"{spread}{datum}"))
+    if content.shape is not None:
+        steep = math.degrees(abs(content.shape.flank))
+        rows.append(("surface", content.shape.form, f"flank {steep:.0f}°"))
+    if content.coverage is not None:
+        rows.append(("seen", f"{100 * content.coverage:.0f} %", "of the surface"))
+    return rows
+
+
+def _volume(content: Content) -> str:
+    if content.volume is None:
+        return f"not known; missing {', '.join(content.missing)}"
+    return with_std(content.volume, content.volume_std, 1.0, " m³")

@@ -95,7 +95,7 @@ class Strapping:
 
 
 def _columns(text: str, path: Path) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    semicolons = text.count(";") > text.count(",")
+    semicolons = ";" in text  # then commas are decimal commas
     rows = csv.reader(text.splitlines(), delimiter=";" if semicolons else ",")
     found: list[tuple[float, float]] = []
     for number, row in enumerate(rows, 1):

@@ -241,8 +241,7 @@ def _content(
     surface = None if core is None else SurfaceMap(core, datum, silo[0])
     volume, std = _empty(found, silo, known) if empty else _volume(request, numbers, found, silo, level, lacking)
     mass = _mass(request.density, volume, std, surface, silo)
-    moving = _moving(request.previous, volume, std, found)
-    return Content(
+    now = Content(
         "ok",
         volume=volume,
         volume_std=std,
@@ -251,11 +250,12 @@ def _content(
         height_datum=datum_name,
         coverage=coverage,
         shape=Shape.of(found["shape"]),
-        quality=(*said, *moving),
+        quality=tuple(said),
         surface=surface,
         **mass,
         **frame,
     )
+    return _moving(now, request.previous)
 
 
 def _lacking(known: Knowledge, found: dict[str, Any]) -> tuple[str, ...]:
@@ -361,17 +361,14 @@ def _columns(surface: SurfaceMap | None, silo: tuple[float, ...]) -> NDArray[np.
     return np.asarray(rise[rise > 0.0])
 
 
-def _moving(previous: Content | None, volume: float | None, std: float | None, found: dict[str, Any]) -> list[Remark]:
-    """Whether the content moved since the frame before: pose, geometry and depth err alike in both."""
-    if previous is None or previous.volume is None or previous.parts is None or volume is None or std is None:
-        return []
-    own = found["std"]
-    alone = [own["noise"], own["grid"], previous.parts.noise, previous.parts.grid]
-    unseen = 0.2 * (own["unseen"] + previous.parts.unseen)  # what hides mostly hides the same in both
-    gap = abs(volume - previous.volume)
-    if gap <= quality.MOVING * math.hypot(unseen, *alone):
-        return []
-    return [Remark("filling-in-progress", f"{volume - previous.volume:+.3f} m³ since the frame before")]
+def _moving(now: Content, previous: Content | None) -> Content:
+    """With the remark that the content moved since the frame before, where it did."""
+    change = None if previous is None else now.change_since(previous)
+    if change is None or abs(change[0]) <= quality.MOVING * change[1]:
+        return now
+    return replace(
+        now, quality=(*now.quality, Remark("filling-in-progress", f"{change[0]:+.3f} m³ since the frame before"))
+    )
 
 
 def _config(request: _Request) -> dict[str, Any]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -54,6 +55,10 @@ class Parts:
     def to_dict(self) -> dict[str, float]:
         """Plain data."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
+
+
+HIDDEN_ALIKE = 0.2
+"""Share of what the unseen leaves that differs from one frame to the next; the rest hides the same in both."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +114,16 @@ class Content:
     def free(self) -> float | None:
         """Volume that still fits, m³."""
         return None if self.volume is None or self.capacity is None else self.capacity - self.volume
+
+    def change_since(self, earlier: Content) -> tuple[float, float] | None:
+        """Volume gained since an earlier reading, m³, and its standard deviation; None where one has no volume.
+
+        Pose, geometry and depth err alike in both readings, so they drop out.
+        """
+        if self.volume is None or earlier.volume is None or self.parts is None or earlier.parts is None:
+            return None
+        own = [(p.noise, p.grid, HIDDEN_ALIKE * p.unseen) for p in (self.parts, earlier.parts)]
+        return self.volume - earlier.volume, math.hypot(*own[0], *own[1])
 
     def has(self, code: str) -> bool:
         """Whether a remark of this code is there."""
