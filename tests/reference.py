@@ -173,11 +173,11 @@ def axis_points(points: Array, normal: Array, X: Array, partners: int = 100) -> 
     """Points where the lines p' + λN' meet the planes π(p, X, N), projected into the plane through the origin (Eq. 4).
 
     Partners p' are the quarter with the greatest |(N × X)·N'| of 4 `partners` evenly spread candidates; of more than
-    3000 candidates only so many, evenly spread, lend their planes.
+    1500 candidates only so many, evenly spread, lend their planes.
     """
     pool, planes = (
         np.array([i * len(points) // n for i in range(n)], dtype=int)
-        for n in (min(4 * partners, len(points)), min(3000, len(points)))
+        for n in (min(4 * partners, len(points)), min(1500, len(points)))
     )
     estimates = []
     for p, N in zip(points[planes], normal[planes], strict=True):

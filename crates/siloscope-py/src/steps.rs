@@ -194,7 +194,7 @@ fn select_candidates<'py>(
         .map(|((k1, k2), (e1, e2))| ShapeTensor { k1: *k1, k2: *k2, e1, e2 })
         .collect();
     let near = near(&neighbours, points.len())?;
-    let found = candidates::select_candidates(&points, &near, &tensors, share, view);
+    let found = candidates::select_candidates(&points, &near, &tensors, share, view, &Workers::new(1));
     let index: Vec<u32> = found.iter().map(|c| c.index as u32).collect();
     Ok((index.into_pyarray(py), to_array(py, &found.iter().map(|c| c.e1).collect::<Vec<_>>())?))
 }

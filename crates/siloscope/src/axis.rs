@@ -122,7 +122,7 @@ pub fn axis_points(walls: &[Wall], x: &Vec3, partners: usize, workers: &Workers)
 }
 
 /// Most planes that are met.
-const PLANES: usize = 3000;
+const PLANES: usize = 1500;
 
 /// Up to `m` numbers below n, evenly spread.
 fn spread_evenly(n: usize, m: usize) -> Vec<u32> {
@@ -131,9 +131,10 @@ fn spread_evenly(n: usize, m: usize) -> Vec<u32> {
 }
 
 /// The axis point a at the camera's height, in the silo's x and y: the medians of the estimated ones.
-pub fn axis_point(estimates: &[AxisPoint]) -> Option<Vector2<f64>> {
+pub fn axis_point(estimates: &[AxisPoint], workers: &Workers) -> Option<Vector2<f64>> {
     let median_of = |i: usize| median(estimates.iter().map(|e| e.at[i]).collect());
-    Some(Vector2::new(median_of(0)?, median_of(1)?))
+    let (x, y) = workers.join(|| median_of(0), || median_of(1));
+    Some(Vector2::new(x?, y?))
 }
 
 /// Median; of an even number of values the mean of the middle two.

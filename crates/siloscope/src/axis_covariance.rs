@@ -15,6 +15,9 @@ const LEAST_BLOCKS: usize = 6;
 /// Largest standard deviation of the direction that still is an answer, radians.
 const MOST_TILT: f64 = 0.05;
 
+/// One estimate of so many is looked at: they are many, and the blocks behind them few. Prime, so that with the usual
+/// numbers of partners a plane's turn never falls on the same partners.
+const SOME: usize = 7;
 /// How near the limit is at the limit, as a share of it.
 const EDGE: f64 = 0.25;
 
@@ -74,14 +77,15 @@ impl Scatter<'_> {
 
     /// Each coordinate solves Σ sign(x_i − median) = 0, whose slope is the density of the estimates at the median.
     fn of_point(&self) -> Matrix2<f64> {
-        let columns = [0, 1].map(|k| self.estimates.iter().map(|e| e.at[k]).collect::<Vec<_>>());
+        let some: Vec<&AxisPoint> = self.estimates.iter().step_by(SOME).collect();
+        let columns = [0, 1].map(|k| some.iter().map(|e| e.at[k]).collect::<Vec<_>>());
         let centre = columns.clone().map(|column| quantiles(column, [0.35, 0.5, 0.65]));
-        let n = self.estimates.len() as f64;
+        let n = some.len() as f64;
         let density = centre.map(|[low, _, high]| n * 0.3 / (high - low).max(f64::MIN_POSITIVE));
         let signs = |e: &AxisPoint| [0, 1].map(|k| 0.5 * (e.at[k] - centre[k][1]).signum());
         let block = |wall: u32| self.block[wall as usize];
-        let planes = self.estimates.iter().map(|e| (block(e.plane), signs(e)));
-        let lines = self.estimates.iter().map(|e| (block(e.line), signs(e)));
+        let planes = some.iter().map(|e| (block(e.plane), signs(e)));
+        let lines = some.iter().map(|e| (block(e.line), signs(e)));
         let both = [sums(planes, self.blocks), sums(lines, self.blocks)];
         let bread = Matrix2::from_diagonal(&Vector2::from(density));
         both.into_iter().map(|scores| self.sandwich(&bread, scores)).sum()

@@ -3,6 +3,7 @@
 use crate::Vec3;
 use crate::neighbours::Neighbours;
 use crate::shape_tensor::ShapeTensor;
+use crate::workers::Workers;
 
 /// From which side the walls are seen; it tells the sign of their curvature, as normals point to the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -61,12 +62,14 @@ pub fn select_candidates(
     tensors: &[ShapeTensor],
     share: f64,
     view: View,
+    workers: &Workers,
 ) -> Vec<Candidate> {
     let least = 1.0 / extent(points);
     let clear = |c: &Candidate| {
         c.bent.abs() > least && view.allows(c.bent) && is_surrounded(points, c.index, neighbours.of(c.index))
     };
-    let mut candidates: Vec<_> = tensors.iter().enumerate().map(|(i, t)| Candidate::new(i, t)).filter(clear).collect();
+    let clear_one = |i: usize| tensors.get(i).map(|t| Candidate::new(i, t)).filter(clear);
+    let mut candidates: Vec<_> = workers.map(tensors.len(), clear_one).into_iter().flatten().collect();
     candidates.sort_by(|a, b| a.straight.abs().total_cmp(&b.straight.abs()));
     candidates.truncate((share * candidates.len() as f64).ceil() as usize);
     candidates

@@ -6,7 +6,7 @@ use crate::backproject::DepthImage;
 use crate::blocks::blocks;
 use crate::candidates::{Candidate, View, select_candidates};
 use crate::coverage::{Coverage, coverage};
-use crate::evidence::{Evidence, placed_walls};
+use crate::evidence::{Evidence, PlacedWall, placed_walls};
 use crate::grid::{Cloud, voxel_grid, voxel_grid_of_image};
 use crate::neighbours::{Neighbours, nearest_neighbours};
 use crate::normals::normals;
@@ -119,7 +119,7 @@ fn locate_in_grid(
 fn axis_seen_from(view: View, surface: &Surface, settings: &Settings, workers: &Workers, clock: &mut Clock) -> Outcome {
     let Surface { cloud, near, normals, tensors } = surface;
     let points = &cloud.points;
-    let candidates = select_candidates(points, near, tensors, settings.share, view); // step 3
+    let candidates = select_candidates(points, near, tensors, settings.share, view, workers); // step 3
     clock.lap("candidates");
     let consensus = consistent_direction(&candidates, settings.agreement); // step 4, Eq. 3
     clock.lap("direction");
@@ -127,10 +127,10 @@ fn axis_seen_from(view: View, surface: &Surface, settings: &Settings, workers: &
     let walls: Vec<Wall> = consensus.kept.iter().map(wall).collect();
     let x = consensus.direction.x;
     let estimates = axis_points(&walls, &x, settings.partners, workers); // step 5, Eq. 4
-    let a = axis_point(&estimates).ok_or(Refusal::NoWall)?;
+    let a = axis_point(&estimates, workers).ok_or(Refusal::NoWall)?;
     clock.lap("point");
     let pose = SiloPose { t_x: -a.x, t_y: -a.y, ..SiloPose::from_axis(&x, &Vec3::zeros()) }; // step 6, Eqs. 6, 7
-    let outcome = assess(surface, &Found { pose, view, candidates, consensus, estimates }, settings);
+    let outcome = assess(surface, &Found { pose, view, candidates, consensus, estimates }, settings, workers);
     clock.lap("evidence");
     outcome
 }
@@ -145,26 +145,41 @@ struct Found {
 }
 
 /// What the paper leaves out: how sure the answer is, whether to give it, and what the frame shows.
-fn assess(surface: &Surface, found: &Found, settings: &Settings) -> Outcome {
+fn assess(surface: &Surface, found: &Found, settings: &Settings, workers: &Workers) -> Outcome {
     let walls = placed_walls(&found.consensus.kept, &surface.cloud.points, &surface.normals, &found.pose);
     let side = BLOCK * settings.grid * (settings.neighbours as f64).sqrt();
-    let mut profile = fit_profile(&surface.cloud.points, &surface.normals, &found.pose, side);
-    let see = |profile: &Profile| {
-        let tolerance = 4.0 * profile.misfit + 0.25 * settings.grid;
-        coverage(&surface.cloud, &surface.normals, &found.pose, profile, tolerance)
-    };
-    let mut coverage = see(&profile);
-    if profile.cone_may_be_feed() && !coverage.is_apex_covered() {
-        profile = Profile { cone: None, ..profile };
-        if profile.radius.is_none() {
-            return Err(Refusal::ConeMayBeFeed);
-        }
-        coverage = see(&profile);
-    }
+    let (seen, covariance) =
+        workers.join(|| shown(surface, &found.pose, side, settings.grid), || covariance(found, &walls, side));
+    let (profile, coverage) = seen?;
     let counts = [surface.cloud.points.len(), found.candidates.len()];
     let evidence = Evidence::of(&walls, counts, found.consensus.direction.spread, coverage.share_behind());
     evidence.judge(found.view)?;
     profile.judge(&found.pose, found.view)?;
+    Ok(Located { pose: found.pose, covariance: covariance?, profile, coverage, evidence, timing: Vec::new() })
+}
+
+/// The silo's profile about the axis, and what the frame shows of it.
+fn shown(
+    surface: &Surface,
+    pose: &SiloPose,
+    side: f64,
+    grid: f64,
+) -> std::result::Result<(Profile, Coverage), Refusal> {
+    let see = |profile: &Profile| {
+        let tolerance = 4.0 * profile.misfit + 0.25 * grid;
+        coverage(&surface.cloud, &surface.normals, pose, profile, tolerance)
+    };
+    let profile = fit_profile(&surface.cloud.points, &surface.normals, pose, side);
+    let coverage = see(&profile);
+    if !profile.cone_may_be_feed() || coverage.is_apex_covered() {
+        return Ok((profile, coverage));
+    }
+    let cylinder = Profile { cone: None, ..profile };
+    if cylinder.radius.is_some() { Ok((cylinder, see(&cylinder))) } else { Err(Refusal::ConeMayBeFeed) }
+}
+
+/// Covariance of the pose by the scatter among the walls' blocks.
+fn covariance(found: &Found, walls: &[PlacedWall], side: f64) -> std::result::Result<Matrix4<f64>, Refusal> {
     let (block, blocks) = blocks(walls.iter().map(|w| w.p), side);
     let turn = found.pose.rotation();
     let scatter = Scatter {
@@ -177,8 +192,7 @@ fn assess(surface: &Surface, found: &Found, settings: &Settings) -> Outcome {
         candidates: &found.candidates.iter().map(|c| turn * c.e1).collect::<Vec<_>>(),
         limit: found.consensus.limit,
     };
-    let covariance = scatter.covariance()?;
-    Ok(Located { pose: found.pose, covariance, profile, coverage, evidence, timing: Vec::new() })
+    scatter.covariance()
 }
 
 /// Side of the blocks whose errors are independent, in units of grid·√k: a neighbourhood's diameter.

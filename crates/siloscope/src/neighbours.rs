@@ -6,7 +6,7 @@ use std::cmp::Ordering;
 use std::ops::Range;
 
 /// Points in a leaf of the tree.
-const LEAF: usize = 12;
+const LEAF: usize = 16;
 /// Bounds of the number of neighbours: fewer can't carry a cubic, more is no neighbourhood.
 pub const NEIGHBOURS: std::ops::RangeInclusive<usize> = 6..=500;
 
@@ -79,8 +79,12 @@ struct Tree {
     levels: u32,
 }
 
-/// A neighbour on trial: squared distance (its bits are in the same order as the number) and index.
-type Found = (u64, u32);
+/// A neighbour on trial: the bits of its squared distance, which are in the same order as the number, and its index.
+type Found = u128;
+
+fn trial(squared: f64, id: u32) -> Found {
+    (Found::from(squared.to_bits()) << 32) | Found::from(id)
+}
 
 impl Tree {
     fn new(points: &[Vec3], workers: &Workers) -> Self {
@@ -118,20 +122,20 @@ impl Tree {
 
     /// The k nearest neighbours of every point of a leaf, one after the other.
     ///
-    /// A point's k-th neighbour is no farther than that of the point before it plus the step between the two, so only
-    /// the first point of a leaf has to look for a bound.
+    /// A point's k-th neighbour is no farther than that of another point plus the step between the two, so only the
+    /// first point of a leaf has to look for a bound.
     fn neighbours_of_leaf(&self, leaf: usize, k: usize) -> Vec<u32> {
         let range = self.range(self.levels, leaf);
         let mut result = Vec::with_capacity(range.len() * k);
         let (mut found, mut open) = (Vec::new(), Vec::new());
-        let mut before: Option<(Vec3, f64)> = None;
+        let mut done: Vec<(Vec3, f64)> = Vec::with_capacity(range.len());
         for i in range {
             let p = self.points[i];
-            let bound = before.map(|(q, reach)| (reach + (p - q).norm()).powi(2) * (1.0 + 1e-12));
-            self.within(i, bound.unwrap_or_else(|| self.first_bound(leaf, k, &p)), &mut open, &mut found);
-            let farthest = keep_nearest(&mut found, k);
-            before = Some((p, farthest));
-            result.extend(found.iter().map(|(_, id)| *id));
+            let reach = done.iter().map(|(q, reach)| reach + (p - q).norm()).min_by(f64::total_cmp);
+            let bound = reach.map_or_else(|| self.first_bound(leaf, k, &p), |reach| reach.powi(2) * (1.0 + 1e-12));
+            self.within(i, bound, &mut open, &mut found);
+            done.push((p, keep_nearest(&mut found, k)));
+            result.extend(found.iter().map(|found| *found as u32));
         }
         result
     }
@@ -159,7 +163,7 @@ impl Tree {
             for j in self.range(level, node) {
                 let squared = (self.points[j] - p).norm_squared();
                 if squared <= bound && j != i {
-                    found.push((squared.to_bits(), self.ids[j]));
+                    found.push(trial(squared, self.ids[j]));
                 }
             }
         }
@@ -173,7 +177,7 @@ fn keep_nearest(found: &mut Vec<Found>, k: usize) -> f64 {
         found.truncate(k);
     }
     found.sort_unstable();
-    found.last().map_or(0.0, |(bits, _)| f64::from_bits(*bits).sqrt())
+    found.last().map_or(0.0, |found| f64::from_bits((found >> 32) as u64).sqrt())
 }
 
 /// Where node `node` of a level begins among n points.
@@ -243,7 +247,8 @@ mod tests {
     fn slow(points: &[Vec3], k: usize) -> Vec<u32> {
         let of = |i: usize| {
             let distance = |j: u32| ((points[j as usize] - points[i]).norm_squared().to_bits(), j);
-            let mut others: Vec<Found> = (0..points.len() as u32).filter(|j| *j as usize != i).map(distance).collect();
+            let mut others: Vec<(u64, u32)> =
+                (0..points.len() as u32).filter(|j| *j as usize != i).map(distance).collect();
             others.sort_unstable();
             others.into_iter().take(k).map(|(_, j)| j)
         };

@@ -40,8 +40,8 @@ pub struct Profile {
 /// Places that the profile rests on, that propose parts, and that judge the proposals: enough of each, and no more
 /// time than a step takes.
 const PLACES: usize = 4000;
-const PROPOSERS: usize = 64;
-const JUDGES: usize = 240;
+const PROPOSERS: usize = 48;
+const JUDGES: usize = 160;
 /// How far a wall's normal may be off its part's, radians: far walls are rough.
 const ANGLE: f64 = 0.25;
 /// How far a wall may be off a proposed part, as a share of the median distance from the axis.
