@@ -50,6 +50,8 @@ class Method:
     available: Callable[[], bool] = lambda: True
     slow: bool = False
     """Whether only some of the frames are tried."""
+    once: bool = False
+    """Whether one run a frame is enough: there is little chance in it, and it takes long."""
 
 
 def ours(**told: Any) -> Callable[[Shown, int], list[Found]]:
@@ -237,10 +239,10 @@ METHODS = (
     Method("PCL cylinder and cone", "nothing", compiled("pcl", 0.0, EXACT), _program("pcl")),
     Method("CGAL Efficient RANSAC", "axis within 0.6 rad", compiled("cgal", PRIOR, CGAL), _program("cgal")),
     Method("CGAL Efficient RANSAC", "nothing", compiled("cgal", 0.0, CGAL), _program("cgal")),
-    Method("pyransac3d Cylinder", "nothing", pyransac, _package("pyransac3d"), slow=True),
-    Method("Open3D ICP", KNOWN, open3d_icp("identity"), _package("open3d")),
-    Method("Open3D ICP", f"{KNOWN}, near start", open3d_icp("near"), _package("open3d")),
-    Method("small_gicp GICP", KNOWN, small_gicp("identity"), _package("small_gicp")),
-    Method("small_gicp GICP", f"{KNOWN}, near start", small_gicp("near"), _package("small_gicp")),
+    Method("pyransac3d Cylinder", "nothing", pyransac, _package("pyransac3d"), slow=True, once=True),
+    Method("Open3D ICP", KNOWN, open3d_icp("identity"), _package("open3d"), once=True),
+    Method("Open3D ICP", f"{KNOWN}, near start", open3d_icp("near"), _package("open3d"), once=True),
+    Method("small_gicp GICP", KNOWN, small_gicp("identity"), _package("small_gicp"), once=True),
+    Method("small_gicp GICP", f"{KNOWN}, near start", small_gicp("near"), _package("small_gicp"), once=True),
 )
 """In the table's order."""

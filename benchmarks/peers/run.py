@@ -60,7 +60,7 @@ def measured(every: int, repeats: int) -> Iterator[Result]:
         for frame in shown(*scene):
             for method in present:
                 if not method.slow or count % SLOW == 0:
-                    yield _result(method, frame, 1 if method.slow else repeats)
+                    yield _result(method, frame, 1 if method.once else repeats)
 
 
 def _result(method: Method, frame: Shown, repeats: int) -> Result:
@@ -184,14 +184,21 @@ def _made(every: int, repeats: int) -> str:
     frames = len(list(scenes())[::every])
     return "\n".join(
         [
-            f"- Frames: {frames} scenes, each as a whole and with its walls alone; {repeats} runs each, other seeds.",
+            f"- Frames: {frames} scenes, each as a whole and with its walls alone; {repeats} runs a method, other seeds.",
             "- Columns in mm are medians of the PC average distance (Eq. 11) on the whole frame by kind of frame; a "
-            f"failure is no answer or more than {1e3 * FAILURE:g} mm. Methods marked slow get every {SLOW}th frame.",
+            f"failure is no answer or more than {1e3 * FAILURE:g} mm. {_exceptions()}",
             "- Times are processor time on one core, from depths in memory to the axis; what is known beforehand "
             "(a registration's target) is not counted.",
             f"- Machine: {machine()}. Versions: siloscope {version()}, {', '.join(_versions())}.",
         ]
     )
+
+
+def _exceptions() -> str:
+    """Which methods get less."""
+    once = sorted({method.name for method in METHODS if method.once})
+    slow = sorted({method.name for method in METHODS if method.slow})
+    return f"Once a frame, as they take long: {', '.join(once)}; and only every {SLOW}th scene: {', '.join(slow)}."
 
 
 def _versions() -> list[str]:
