@@ -15,7 +15,7 @@ import siloscope
 from silos import known, measured, noisy, percent, scene
 from siloscope.content import QUALITY
 from siloscope.errors import InputError, UsageError
-from siloscope.scene import ASTRA_S, Defects, Feed, Silo
+from siloscope.scene import ASTRA_S, PERFECT, Defects, Feed, Silo
 
 PLACES = [(0.0, 0.0), (0.4, 0.2), (-0.8, 0.3), (0.2, -0.9)]
 
@@ -69,7 +69,8 @@ class TestLaws:
     @pytest.mark.parametrize("parameter", range(10))
     def test_a_parameters_deviation_is_what_moving_it_does(self, parameter: int) -> None:
         """The analytic derivatives against measuring anew with the parameter moved."""
-        made = scene(Feed("gaussian+tilted", 0.55, tilt=0.1), place=(0.5, -0.2))
+        exact = replace(PERFECT, bias=ASTRA_S.bias)
+        made = scene(Feed("gaussian+tilted", 0.55, tilt=0.1), place=(0.5, -0.2), sensor=exact)
         frame = made.render().frame()
         calibration = known(made)
         step = 2e-4
@@ -205,6 +206,35 @@ class TestTruth:
         assert beyond.missing == ("radius",)
         with_tape = siloscope.measure(full.frame(), blind, diameter=2.0 * made.silo.radius)
         assert with_tape.volume == pytest.approx(full.true_volume, abs=1e-3 * made.silo.capacity)
+        taped = replace(blind, config={**blind.config, "diameter": 2.0 * made.silo.radius})
+        assert siloscope.measure(full.frame(), taped).volume == with_tape.volume
+
+    def test_a_small_heap_in_an_endless_cone_is_as_sure_as_with_the_cylinder(self) -> None:
+        """The map's cells must fit the heap, not the cone continued up to a camera that sees no cylinder."""
+        narrow = replace(silos.SMALL, fx=2.0 * silos.SMALL.fx, fy=2.0 * silos.SMALL.fy)
+        made = replace(scene(Feed("mound", 0.12)), camera=narrow)
+        calibration = known(made)
+        assert calibration.parameters is not None
+        values = calibration.parameters.copy()
+        values[4] = np.nan
+        blind = replace(calibration, parameters=values, silo=siloscope.SiloGeometry(apex=calibration.silo.apex))
+        frame = made.render()
+        with_wall, without = (siloscope.measure(frame.frame(), c) for c in (calibration, blind))
+        assert without.volume == pytest.approx(frame.true_volume, abs=3.0 * (without.volume_std or 0.0))
+        assert (without.volume_std or np.inf) < 2.0 * (with_wall.volume_std or 0.0)
+
+    def test_an_unknown_scale_costs_three_times_itself(self) -> None:
+        """The pose's place, all lengths and the scale together: V goes with the cube."""
+        made = scene(Feed("funnel", 0.3), sensor=replace(PERFECT, bias=ASTRA_S.bias))
+        calibration = known(made)
+        values = calibration.parameters
+        assert values is not None
+        s = 0.01
+        along = np.array([0, 0, *values[2:5], 0, values[6], 0, -(1 + values[8]), -2 * values[9], 0, 0])
+        found = siloscope.measure(
+            made.render().frame(), replace(calibration, parameter_covariance=s**2 * np.outer(along, along))
+        )
+        assert found.volume_std == pytest.approx(3.0 * s * (found.volume or 0.0), rel=0.03)
 
     def test_without_the_cone_there_is_a_level_but_no_volume(self) -> None:
         made = scene(Feed("flat", 0.7))

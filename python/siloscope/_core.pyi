@@ -110,6 +110,7 @@ def content_measure(
     wall_std: float,
     bias: tuple[float, ...],
     noise: tuple[float, ...],
+    noise_known: bool,
     range: tuple[float, float],
 ) -> tuple[dict[str, Any], ContentSurface | None]: ...
 def content_relief(

@@ -40,7 +40,7 @@ fn vessel_volume_below(silo: [f64; 8], z: Vec<f64>) -> PyResult<Vec<f64>> {
 ///
 /// `rays` (H, W, 2) are needed where the camera's lens distorts. Returns plain numbers, and the surface or None.
 #[pyfunction]
-#[pyo3(signature = (data, camera, rays, pose, silo, covariance, wall_std, bias, noise, range))]
+#[pyo3(signature = (data, camera, rays, pose, silo, covariance, wall_std, bias, noise, noise_known, range))]
 #[allow(clippy::too_many_arguments)]
 fn content_measure<'py>(
     py: Python<'py>,
@@ -53,6 +53,7 @@ fn content_measure<'py>(
     wall_std: f64,
     bias: [f64; 3],
     noise: [f64; 6],
+    noise_known: bool,
     range: [f64; 2],
 ) -> PyResult<(Bound<'py, PyDict>, Option<ContentSurface>)> {
     let camera = camera.map(convert::camera).transpose()?;
@@ -63,6 +64,7 @@ fn content_measure<'py>(
         wall_std,
         bias: DepthBias { offset: bias[0], scale: bias[1], quadratic: bias[2] },
         noise: noise_law(noise),
+        noise_known,
         range,
     };
     let shape = (data.shape()[0], data.shape()[1]);

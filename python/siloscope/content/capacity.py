@@ -134,7 +134,11 @@ class Lengths:
     assumed: tuple[str, ...]
     """What was taken from elsewhere than the calibration, in words."""
     added_variance: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Variance of radius, cylinder_bottom and apex where they are the datasheet's, m²."""
+    """What the datasheet adds to the variance of radius, cylinder_bottom and apex, m²."""
+    bottom_from: str = "wall"
+    """Where `cylinder_bottom` comes from: "wall" where cone and cylinder meet, "vertex", or "top"."""
+    apex_from: str = "wall"
+    """Where `apex` comes from: "wall", or "bottom" for the cylinder's bottom."""
     cone_only: bool = False
     """Whether nobody knows the cylinder, so that `geometry` is the cone continued up to the camera."""
 
@@ -144,24 +148,26 @@ def complete(seen: SiloGeometry, sheet: Datasheet, top: float | None) -> Lengths
     radius, bottom, apex = seen.radius, seen.cylinder_bottom, seen.apex
     assumed: list[str] = []
     variance = [0.0, 0.0, 0.0]
+    bottom_from = apex_from = "wall"
     own = LENGTH_STD**2
     if radius is None and sheet.diameter is not None:
         radius, variance[0] = sheet.diameter / 2.0, own / 4.0
-        assumed.append("radius from the datasheet")
+        assumed.append("radius from the given diameter")
     if bottom is None and top is not None and sheet.cylinder is not None:
-        bottom, variance[1] = top + sheet.cylinder, own
+        bottom, variance[1], bottom_from = top + sheet.cylinder, own, "top"
         assumed.append("cylinder's bottom from the datasheet and the given top")
     if bottom is None and apex is not None and sheet.cone is not None:
-        bottom, variance[1] = apex - sheet.cone, own
+        bottom, variance[1], bottom_from = apex - sheet.cone, own, "vertex"
         assumed.append("cylinder's bottom from the vertex and the datasheet's cone")
     if apex is None and bottom is not None and sheet.cone is not None:
-        apex, variance[2] = bottom + sheet.cone, own
+        apex, variance[2], apex_from = bottom + sheet.cone, own, "bottom"
         assumed.append("cone's vertex from the cylinder's bottom and the datasheet's cone")
     edge, source = _top(bottom, sheet, top)
     if source == "camera":
         assumed.append("the silo can be filled up to the camera's height")
     added = (variance[0], variance[1], variance[2])
-    return Lengths(SiloGeometry(radius, bottom, apex), edge, source, tuple(assumed), added)
+    geometry = SiloGeometry(radius, bottom, apex)
+    return Lengths(geometry, edge, source, tuple(assumed), added, bottom_from, apex_from)
 
 
 def _top(bottom: float | None, sheet: Datasheet, top: float | None) -> tuple[float, str]:

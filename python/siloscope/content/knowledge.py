@@ -38,6 +38,8 @@ class Knowledge:
     """(10, 10) over `PARAMETERS`."""
     bias: tuple[float, float, float]
     noise: tuple[float, float, float, float, float, float]
+    noise_known: bool
+    """Whether that is the sensor's own noise and not `TYPICAL_NOISE`."""
     range: tuple[float, float]
     ovality: tuple[float, float] = (0.0, 0.0)
     """How oval the silo is, as the calibration has it (`siloscope.surface`)."""
@@ -66,10 +68,9 @@ def know(
             f"the calibration was made with the depth bias of '{own.name}', not of '{sensor.name}'; leave the sensor "
             "out, or calibrate with it"
         )
+    sheet = _with_tape(sheet, calibration)
     lengths = _cone_alone(calibration, _joint(calibration, complete(calibration.silo, sheet, top), sheet))
-    covariance = _covariance(calibration, lengths.cone_only) + np.diag(
-        [0.0] * 4 + list(lengths.added_variance) + [0.0] * 3
-    )
+    covariance = _covariance(calibration, lengths)
     _check_diameter(diameter, calibration.silo, float(covariance[4, 4]))
     assumed = list(lengths.assumed)
     if profile.noise is None:
@@ -82,6 +83,7 @@ def know(
         covariance,
         _bias(calibration, profile),
         profile.noise or TYPICAL_NOISE,
+        profile.noise is not None,
         profile.range,
         _ovality(calibration),
         tuple(assumed),
@@ -89,19 +91,41 @@ def know(
     )
 
 
+def _with_tape(sheet: Datasheet, calibration: Calibration) -> Datasheet:
+    """The datasheet with the diameter that the calibration was given, where it has none of its own."""
+    taped = calibration.config.get("diameter")
+    if sheet.diameter is not None or not isinstance(taped, int | float):
+        return sheet
+    return replace(sheet, diameter=float(taped))
+
+
+def narrowed(known: Knowledge, calibration: Calibration, radius: float) -> Knowledge:
+    """The same, with a cone of which nobody knows where it ends cut off at a radius."""
+    apex, slope = known.lengths.geometry.apex, _slope(calibration)
+    if apex is None:
+        return known
+    lengths = replace(known.lengths, geometry=SiloGeometry(radius, apex - radius / slope, apex))
+    return replace(known, lengths=lengths, covariance=_covariance(calibration, lengths))
+
+
+def _slope(calibration: Calibration) -> float:
+    """The cone's, dr/dz; NaN where it was not seen."""
+    slope = math.nan if calibration.parameters is None else float(calibration.parameters[5])
+    return slope if slope > 0.0 else math.nan
+
+
 def _joint(calibration: Calibration, lengths: Lengths, sheet: Datasheet) -> Lengths:
     """The cylinder's bottom where the cone that was seen is as wide as the datasheet's diameter."""
     geometry = lengths.geometry
-    slope = math.nan if calibration.parameters is None else float(calibration.parameters[5])
-    if geometry.radius is None or geometry.cylinder_bottom is not None or geometry.apex is None or not slope > 0.0:
+    slope = _slope(calibration)
+    if geometry.radius is None or geometry.cylinder_bottom is not None or geometry.apex is None or math.isnan(slope):
         return lengths
     bottom = geometry.apex - geometry.radius / slope
     edge = lengths.top if sheet.cylinder is None or lengths.top_from == "given" else bottom - sheet.cylinder
     told = lengths.top_from if edge == lengths.top else "datasheet"
     said = (*lengths.assumed, "cylinder's bottom where the seen cone is as wide as the given diameter")
-    variance = (lengths.added_variance[0], lengths.added_variance[0] / slope**2, 0.0)
     made = SiloGeometry(geometry.radius, bottom, geometry.apex)
-    return replace(lengths, geometry=made, top=edge, top_from=told, assumed=said, added_variance=variance)
+    return replace(lengths, geometry=made, top=edge, top_from=told, assumed=said)
 
 
 def _cone_alone(calibration: Calibration, lengths: Lengths) -> Lengths:
@@ -154,28 +178,43 @@ def _ovality(calibration: Calibration) -> tuple[float, float]:
     return float(known[10]), float(known[11])
 
 
-def _covariance(calibration: Calibration, cone_only: bool) -> NDArray[np.float64]:
-    """The calibration's covariance with the cylinder's bottom in the place of the cone's slope.
-
-    Of a cone alone, the radius is that at the camera's height, R = m z_a, and the bottom is fixed there.
-    """
+def _covariance(calibration: Calibration, lengths: Lengths) -> NDArray[np.float64]:
+    """The calibration's covariance and the datasheet's, with the cylinder's bottom in the place of the cone's slope."""
     if calibration.parameters is None or calibration.parameter_covariance is None:
-        made = np.zeros((10, 10))
+        made = np.diag([0.0] * 4 + list(lengths.added_variance) + [0.0] * 3)
         if calibration.covariance is not None:
             made[:4, :4] = calibration.covariance
         return made
-    jacobian = np.eye(10)
-    radius, slope, apex = calibration.parameters[4:7]
-    if cone_only:
-        jacobian[4, 4:7] = (0.0, apex, slope)
-        jacobian[5, 5] = 0.0
-    elif np.isfinite([radius, slope, apex]).all():  # cylinder_bottom = apex - R / m
-        jacobian[5, 4:7] = (-1.0 / slope, radius / slope**2, 1.0)
-    else:
-        jacobian[5, 5] = 0.0
+    of_radius, of_bottom, of_apex = lengths.added_variance
     own = np.nan_to_num(calibration.parameter_covariance)[:10, :10]
-    made = jacobian @ own @ jacobian.T
+    own[4, 4] += of_radius
+    jacobian = _jacobian(calibration, lengths)
+    extra = np.zeros((10, 10))
+    both = slice(5, 7) if lengths.apex_from == "bottom" else slice(5, 6)
+    extra[both, both] = of_bottom
+    extra[6, 6] += of_apex
+    made = jacobian @ own @ jacobian.T + extra
     return np.asarray(0.5 * (made + made.T))
+
+
+def _jacobian(calibration: Calibration, lengths: Lengths) -> NDArray[np.float64]:
+    """Derivatives of `PARAMETERS` by the calibration's, which have the cone's slope m = dr/dz after the radius.
+
+    Where cone and cylinder meet, z_b = z_a - R / m. Of a cone alone z_b is where we cut it, and R = m (z_a - z_b).
+    """
+    jacobian = np.eye(10)
+    slope, geometry = _slope(calibration), lengths.geometry
+    jacobian[5, 5] = 0.0
+    if geometry.radius is not None and geometry.cylinder_bottom is not None and geometry.apex is not None:
+        if lengths.cone_only:
+            jacobian[4, 4:7] = (0.0, geometry.apex - geometry.cylinder_bottom, slope)
+        elif lengths.bottom_from == "wall":
+            jacobian[5, 4:7] = (-1.0 / slope, geometry.radius / slope**2, 1.0)
+        elif lengths.bottom_from == "vertex":
+            jacobian[5, 6] = 1.0
+        if lengths.apex_from == "bottom":
+            jacobian[6] = jacobian[5]
+    return np.nan_to_num(jacobian)
 
 
 def _check_diameter(diameter: float | None, silo: SiloGeometry, variance: float) -> None:

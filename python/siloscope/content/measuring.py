@@ -19,7 +19,7 @@ from siloscope.camera import Camera
 from siloscope.content import quality
 from siloscope.content.capacity import Datasheet, Strapping, missing
 from siloscope.content.density import Density, choose
-from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge, know
+from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge, know, narrowed
 from siloscope.content.quality import QUALITY, Remark
 from siloscope.content.result import Content, Level, Parts
 from siloscope.content.surface_map import Shape, SurfaceMap
@@ -34,6 +34,9 @@ BOTTOMLESS = 100.0
 
 FEWEST = 3
 """Fewer cells than this that seem to show content on an otherwise bare floor are no content."""
+
+BEHIND = 1.5
+"""Cells behind the farthest one that shows the bare cone at which a cone without an end is cut off."""
 
 DETECTABLE = 3.0
 """A heap on the vertex lower than so many standard deviations of a cell's thickness goes unseen."""
@@ -113,10 +116,13 @@ def measure(
         return known
     prepared = prepare(data, _camera(data, camera, located), profile or sensors.UNKNOWN,
                        depth_unit=depth_unit, mask=mask)  # fmt: skip
-    request = _Request(known, sheet, table, chosen, previous, calibration is None)
     ready = time.perf_counter()
     found, surface = _run(prepared, known, sheet)
+    if known.lengths.cone_only:
+        known = _closer(known, located, found, surface)
+        found, surface = _run(prepared, known, sheet)
     done = time.perf_counter()
+    request = _Request(known, sheet, table, chosen, previous, calibration is None)
     times = {"prepare": 1e3 * (ready - start), "measure": 1e3 * (done - ready)}
     return _content(request, data, found, surface, {**prepared.config, **known.config}, times)
 
@@ -181,10 +187,21 @@ def _run(prepared: Prepared, known: Knowledge, sheet: Datasheet) -> tuple[dict[s
     try:
         return _core.content_measure(
             depth, camera, rays, pose, silo, known.covariance, WALL_STD, known.bias, known.noise,
-            known.range,
+            known.noise_known, known.range,
         )  # fmt: skip
     except ValueError as error:
         raise UsageError(str(error)) from None
+
+
+def _closer(
+    known: Knowledge, calibration: Calibration, found: dict[str, Any], core: _core.ContentSurface | None
+) -> Knowledge:
+    """A cone of which nobody knows where it ends, cut off behind the farthest bare wall, so that the map fits it."""
+    radius = known.lengths.geometry.radius
+    if found["bare"] is None or core is None or radius is None:
+        return known
+    _, reach, side = core.grid
+    return narrowed(known, calibration, min(found["bare"][1] + BEHIND * 2.0 * reach / side, radius))
 
 
 def _silo(known: Knowledge, sheet: Datasheet) -> tuple[float, ...]:

@@ -134,6 +134,13 @@ class SurfaceMap:
         flat = self.core.z_at(np.ascontiguousarray(xy.reshape(-1, 2)))
         return np.asarray(self.datum - flat).reshape(xy.shape[:-1])
 
+    def cells(self, places: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Rows and columns of the cells at places (..., 2), the nearest ones beyond the map."""
+        xy = np.asarray(places, np.float64)
+        column, row = (np.floor((xy[..., k] - first[0]) / self.cell + 0.5) for k, first in ((0, self.x), (1, self.y)))
+        side = len(self.x) - 1
+        return np.clip(row, 0, side).astype(np.intp), np.clip(column, 0, side).astype(np.intp)
+
     @cached_property
     def shape(self) -> Shape | None:
         """How the seen part lies; None where it is too small to tell."""

@@ -9,19 +9,30 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import LinearSegmentedColormap, Normalize
+from matplotlib.colors import LinearSegmentedColormap, Normalize, to_rgb
 from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
+from matplotlib.patheffects import AbstractPathEffect, withStroke
 from numpy.typing import NDArray
 
 from siloscope.content.result import Content
 from siloscope.content.surface_map import SurfaceMap
-from siloscope.plots.style import AMBER, BLUE, GREEN, GREY, INK, MUTED, RED, RULE, figure, heading, legend, tidy
+from siloscope.plots.style import AMBER, BLUE, GREEN, INK, MUTED, RED, RULE, figure, heading, legend, tidy
 
 Numbers = NDArray[np.float64]
 
 GRAIN = LinearSegmentedColormap.from_list("grain", ["#3b2a14", "#8a5a1c", "#d9962b", "#f6d88b", "#fff6da"])
 """Low to high: dark to light in print too."""
+
+FEED = "#d9a441"
+WALL = "#dde2e8"
+LIGHT = -0.66
+"""Direction from which the light comes, radians."""
+SOLID: dict[str, Any] = {"linewidth": 0, "antialiased": False, "shade": False}
+
+RASTER = 301
+"""Places along a side at which a map is drawn."""
 
 TURNS = 97
 RINGS = 41
@@ -50,46 +61,53 @@ def height_map(content: Content) -> Figure:
     surface, silo = _parts(content)
     made = figure(12.4, 5.6)
     left, right = made.subplots(1, 2)
-    heights, covered = surface.heights, _covered(surface, silo)
+    at = np.linspace(-silo.radius, silo.radius, RASTER)
+    places = np.stack(np.meshgrid(at, at), axis=-1)
+    across, heights = np.hypot(places[..., 0], places[..., 1]), surface.height(places)
+    covered = (across <= silo.radius) & (heights > silo.floor(across))
     shown = np.where(covered, heights, np.nan)
-    _map(left, surface, shown, GRAIN, "height (m)", made)
+    _map(left, at, shown, GRAIN, "height (m)", made)
     steps = _levels(shown)
     if len(steps) > 1:
-        lines = left.contour(surface.x, surface.y, shown, levels=steps, colors=INK, linewidths=0.7)
-        left.clabel(lines, fmt="%.2f", fontsize=8)
+        _contours(left, at, shown, steps)
     tidy(left, f"height over the {_datum(content)} (m)", "x (m)", "y (m)")
-    std = np.where(covered, 1e3 * surface.std, np.nan)
-    _map(right, surface, std, "cividis_r", "standard deviation (mm)", made)
-    unseen = np.where(covered & ~surface.seen, 1.0, np.nan)
-    right.contourf(surface.x, surface.y, np.nan_to_num(unseen), levels=[0.5, 1.5], colors="none", hatches=["////"])
+    cells = surface.cells(places)
+    std = np.where(covered, 1e3 * surface.core.std()[cells], np.nan)
+    _map(right, at, std, "cividis_r", "standard deviation (mm)", made)
+    unseen = np.where(covered & ~surface.seen[cells], 1.0, 0.0)
+    if unseen.any():
+        right.contourf(at, at, unseen, levels=[0.5, 1.5], colors="none", hatches=["////"])
     tidy(right, "standard deviation (mm); hatched where not seen", "x (m)", "y (m)")
     for axes in (left, right):
+        axes.grid(visible=False)
         _outline(axes, silo.radius)
     heading(made, headline(content))
     return made
 
 
 def surface_3d(content: Content, azimuth: float = -60.0) -> Figure:
-    """The surface in the silo, whose wall is cut open towards the viewer."""
+    """The content in the silo, whose wall is cut open towards the viewer."""
     surface, silo = _parts(content)
-    made = figure(8.2, 8.2)
-    axes: Any = made.add_subplot(projection="3d")
-    behind = np.radians(azimuth) + np.linspace(0.5 * np.pi, 1.5 * np.pi, 49)
-    _wall(axes, silo, behind)
+    made = figure(float(np.clip(6.0 * 2.0 * silo.radius / (silo.top - silo.vertex) + 3.2, 5.6, 9.0)), 8.2)
+    axes: Any = made.add_subplot(projection="3d", computed_zorder=False)
+    front = np.radians(azimuth) + np.linspace(-0.5 * np.pi, 0.5 * np.pi, 61)
+    bottom = silo.vertex if silo.joint is None else silo.joint
+    _skin(axes, front + np.pi, _ring(silo, bottom), _ring(silo, silo.top), WALL, 1)
+    _skin(axes, front + np.pi, _ring(silo, silo.vertex), _ring(silo, bottom), WALL, 1)
     r, angle = np.meshgrid(np.linspace(1e-3, 1.0, RINGS) * silo.radius, np.linspace(0.0, 2.0 * np.pi, TURNS))
     x, y = r * np.cos(angle), r * np.sin(angle)
     heights = surface.height(np.stack([x, y], axis=-1))
     heights = np.where(heights > silo.floor(r), heights, np.nan)
-    shade = _shade(heights, x, y)
-    axes.plot_surface(
-        x, y, heights, facecolors=shade, rstride=1, cstride=1, linewidth=0, antialiased=False, shade=False
-    )
-    rim = np.linspace(0.0, 2.0 * np.pi, 181)
+    if np.isfinite(heights).any():
+        colours = _shade(heights, x, y)
+        axes.plot_surface(x, y, heights, facecolors=colours, rstride=1, cstride=1, zorder=2, **SOLID)
+        _body(axes, surface, silo, front)
     for height in (silo.top, silo.joint):
-        if height is not None:
-            line = {"color": MUTED, "linewidth": 0.8}
-            axes.plot(silo.radius * np.cos(rim), silo.radius * np.sin(rim), np.full(rim.shape, height), **line)
-    axes.set_box_aspect((2 * silo.radius, 2 * silo.radius, silo.top - silo.vertex))
+        for half, order in ((front + np.pi, 1), (front, 4)):
+            if height is not None:
+                edge = silo.radius * np.cos(half), silo.radius * np.sin(half), np.full(half.shape, height)
+                axes.plot(*edge, color=MUTED, linewidth=0.8, zorder=order)
+    axes.set_box_aspect((2 * silo.radius, 2 * silo.radius, silo.top - silo.vertex), zoom=1.08)
     axes.view_init(elev=24.0, azim=azimuth)
     axes.set_xlabel("x (m)", color=MUTED)
     axes.set_ylabel("y (m)", color=MUTED)
@@ -109,7 +127,7 @@ def section(content: Content, azimuths: Sequence[float] = (0.0, 90.0)) -> Figure
         tidy(axes, f"at {azimuth:.0f}° from x towards y", "distance from the axis (m)")
         axes.set_aspect("equal")
     made.axes[0].set_ylabel(f"height over the {_datum(content)} (m)", fontsize=10, color=MUTED)
-    legend(made.axes[0], columns=2)
+    legend(made.axes[0], columns=3)
     heading(made, headline(content))
     return made
 
@@ -189,20 +207,13 @@ def _parts(content: Content) -> tuple[SurfaceMap, _Silo]:
     return surface, _Silo(surface.radius, joint, vertex, datum - lengths.top)
 
 
-def _covered(surface: SurfaceMap, silo: _Silo) -> NDArray[np.bool_]:
-    """Cells in which content lies over the floor."""
-    across = np.hypot(surface.x[None, :], surface.y[:, None])
-    covered: NDArray[np.bool_] = surface.inside & (surface.heights > silo.floor(across))
-    return covered
-
-
 def _datum(content: Content) -> str:
     return "cone's vertex" if content.height_datum == "cone-vertex" else "lowest point seen"
 
 
-def _map(axes: Axes, surface: SurfaceMap, values: Numbers, colours: Any, label: str, made: Figure) -> None:
-    half = surface.cell / 2.0
-    extent = (surface.x[0] - half, surface.x[-1] + half, surface.y[0] - half, surface.y[-1] + half)
+def _map(axes: Axes, at: Numbers, values: Numbers, colours: Any, label: str, made: Figure) -> None:
+    half = 0.5 * (at[1] - at[0])
+    extent = (at[0] - half, at[-1] + half, at[0] - half, at[-1] + half)
     image = axes.imshow(values, origin="lower", extent=extent, cmap=colours, interpolation="nearest")
     bar = made.colorbar(image, ax=axes, shrink=0.8, label=label)
     bar.outline.set_visible(False)
@@ -218,7 +229,20 @@ def _levels(heights: Numbers) -> Numbers:
     return np.arange(np.ceil(known.min() / step) * step, known.max(), step)
 
 
+def _contours(axes: Axes, at: Numbers, heights: Numbers, steps: Numbers) -> None:
+    """Lines of equal height with a light seam, so that they show on dark and on light."""
+    lines = axes.contour(at, at, heights, levels=steps, colors=INK, linewidths=0.7)
+    seam: list[AbstractPathEffect] = [withStroke(linewidth=2.0, foreground="white", alpha=0.55)]
+    lines.set(path_effects=seam)
+    for label in axes.clabel(lines, fmt="%.2f", fontsize=8):
+        label.set_path_effects(seam)
+
+
 def _outline(axes: Axes, radius: float) -> None:
+    """The wall, with what the cells show beyond it cut off."""
+    inside = Circle((0.0, 0.0), radius, transform=axes.transData)
+    for shown in (*axes.images, *axes.collections):
+        shown.set_clip_path(inside)
     turn = np.linspace(0.0, 2.0 * np.pi, 241)
     axes.plot(radius * np.cos(turn), radius * np.sin(turn), color=INK, linewidth=1.2)
     axes.plot(0.0, 0.0, "+", color=INK, markersize=8)
@@ -227,17 +251,36 @@ def _outline(axes: Axes, radius: float) -> None:
     axes.set_ylim(-1.05 * radius, 1.05 * radius)
 
 
-def _wall(axes: Any, silo: _Silo, angles: Numbers) -> None:
-    """The half of cylinder and cone behind the content."""
-    bottom = silo.joint if silo.joint is not None else silo.vertex
-    for low, high in ((bottom, silo.top), (silo.vertex, bottom)):
-        if high - low < 1e-9:
-            continue
-        share, angle = np.meshgrid(np.linspace(0.0, 1.0, 2), angles)
-        cone = silo.joint is not None and low == silo.vertex
-        r = silo.radius * (share if cone else np.ones_like(share))
-        axes.plot_surface(r * np.cos(angle), r * np.sin(angle), low + share * (high - low), color=GREY, alpha=0.35,
-                          linewidth=0, antialiased=False)  # fmt: skip
+def _ring(silo: _Silo, height: float) -> tuple[float, float]:
+    """Radius of the silo at a height, and that height."""
+    if silo.joint is None or height >= silo.joint:
+        return silo.radius, height
+    return silo.radius * (height - silo.vertex) / (silo.joint - silo.vertex), height
+
+
+def _skin(axes: Any, angles: Numbers, low: Any, high: Any, colour: str, order: int) -> None:
+    """A strip of wall between two rings (radius, height), each number or one for every angle; lit from one side."""
+    r, z = (np.stack([np.broadcast_to(ring[k], angles.shape) for ring in (low, high)]) for k in (0, 1))
+    if float(np.max(z[1] - z[0])) < 1e-9:
+        return
+    light = 0.72 + 0.28 * np.abs(np.cos(angles[:-1] - LIGHT))
+    colours = np.array(to_rgb(colour)) * light[:, None]
+    axes.plot_surface(r * np.cos(angles), r * np.sin(angles), z, facecolors=colours[None], rstride=1, cstride=1,
+                      zorder=order, **SOLID)  # fmt: skip
+
+
+def _body(axes: Any, surface: SurfaceMap, silo: _Silo, angles: Numbers) -> None:
+    """The content's outside towards the viewer: along the cylinder up to its surface, and along the cone."""
+    along = np.linspace(0.0, 1.0, 4 * RINGS) * silo.radius
+    places = along[:, None, None] * np.stack([np.cos(angles), np.sin(angles)], axis=-1)[None]
+    heights, floor = surface.height(places), silo.floor(along)[:, None]
+    covered = heights > floor
+    outermost = np.where(covered.any(axis=0), len(along) - 1 - np.argmax(covered[::-1], axis=0), 0)
+    rim = along[outermost], np.maximum(heights[outermost, np.arange(len(angles))], floor[outermost, 0])
+    joint = silo.vertex if silo.joint is None else silo.joint
+    _skin(axes, angles, (rim[0], np.minimum(rim[1], joint)), rim, FEED, 3)
+    _skin(axes, angles, (0.0 if silo.joint is not None else silo.radius, silo.vertex),
+          (rim[0], np.minimum(rim[1], joint)), FEED, 3)  # fmt: skip
 
 
 def _shade(heights: Numbers, x: Numbers, y: Numbers) -> Any:
@@ -248,7 +291,7 @@ def _shade(heights: Numbers, x: Numbers, y: Numbers) -> Any:
     along, across = (np.stack([rises[2 + a], rises[4 + a], rises[a]], axis=-1) for a in (0, 1))
     normal = np.cross(across, along)
     normal /= np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
-    light = np.abs(normal @ np.array([0.45, -0.35, 0.82]))
+    light = np.abs(normal @ np.array([0.57 * math.cos(LIGHT), 0.57 * math.sin(LIGHT), 0.82]))
     colours[..., :3] *= (0.55 + 0.45 * light)[..., None]
     return colours
 
@@ -256,15 +299,14 @@ def _shade(heights: Numbers, x: Numbers, y: Numbers) -> Any:
 def _profile(axes: Axes, surface: SurfaceMap, silo: _Silo, azimuth: float) -> None:
     s = np.linspace(-silo.radius, silo.radius, 241)
     places = np.stack([s * np.cos(azimuth), s * np.sin(azimuth)], axis=-1)
-    columns = np.clip(((places[:, 0] - surface.x[0]) / surface.cell + 0.5).astype(int), 0, len(surface.x) - 1)
-    rows = np.clip(((places[:, 1] - surface.y[0]) / surface.cell + 0.5).astype(int), 0, len(surface.y) - 1)
+    cells = surface.cells(places)
     heights, floor = surface.height(places), silo.floor(np.abs(s))
-    std = np.nan_to_num(surface.std[rows, columns])
+    std = surface.core.std()[cells]
     covered = heights > floor
-    seen = surface.seen[rows, columns] & covered
-    axes.fill_between(s, floor, np.where(covered, heights, floor), color="#f6d88b", alpha=0.6, linewidth=0)
+    seen = surface.seen[cells] & covered
+    axes.fill_between(s, floor, np.where(covered, heights, floor), color="#f6d88b", linewidth=0, label="content")
     low, high = heights - 2 * std, heights + 2 * std
-    band = {"color": AMBER, "alpha": 0.35, "linewidth": 0, "label": "95 % band"}
+    band = {"color": BLUE, "alpha": 0.3, "linewidth": 0, "label": "95 % band"}
     axes.fill_between(s, low, high, where=list(covered), **band)  # type: ignore[arg-type]
     axes.plot(s, np.where(seen, heights, np.nan), color=INK, linewidth=2.0, label="surface, seen")
     axes.plot(s, np.where(covered & ~seen, heights, np.nan), color=INK, linewidth=1.4, linestyle="--",

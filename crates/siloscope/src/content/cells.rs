@@ -111,6 +111,15 @@ impl Bound {
         }
     }
 
+    /// Whether the wall takes no return from a cell with this middle and side.
+    pub fn clears(&self, [x, y]: [f64; 2], side: f64, cell: &Cell) -> bool {
+        let far = x.hypot(y) + 0.5 * f64::sqrt(2.0) * side;
+        let [px, py, pz] = cell.mean.map(|m| m as f32);
+        let out = far as f32 / px.hypot(py).max(1e-6);
+        !cell.seen() && far < f64::from(self.radius)
+            || cell.seen() && self.side([px * out, py * out, pz], pz.max(STEP)) == Side::Inside
+    }
+
     #[inline]
     fn margin(&self, depth: f32) -> [f32; 2] {
         let last = self.margins.len().saturating_sub(1);
@@ -144,7 +153,7 @@ impl Cell {
         if self.count > 0.0 {
             self.mean = self.mean.map(|sum| sum / self.count);
             let depth = lever.depth(self.mean);
-            self.variance = (noise.sigma(depth) * self.mean[2] / depth).powi(2) / self.count;
+            self.variance = (noise.sigma(depth) / lever.gain(depth) * self.mean[2] / depth).powi(2) / self.count;
         }
     }
 }

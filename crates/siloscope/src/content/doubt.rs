@@ -2,6 +2,7 @@
 
 use super::vessel::Vessel;
 use crate::SiloPose;
+use crate::sensor::DepthBias;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Number of parameters of a calibration.
@@ -21,9 +22,10 @@ pub const GEOMETRY: std::ops::Range<usize> = 4..7;
 /// See `POSE`.
 pub const DEPTH: std::ops::Range<usize> = 7..10;
 
-/// The pose's rotation and its derivatives.
+/// The pose's rotation and its derivatives, and the depth bias.
 #[derive(Debug, Clone)]
 pub struct Lever {
+    bias: DepthBias,
     rotation: Matrix3<f64>,
     turned: [Matrix3<f64>; 2],
     translation: Vector3<f64>,
@@ -31,10 +33,11 @@ pub struct Lever {
 
 impl Lever {
     /// Works out the matrices of a pose.
-    pub fn new(pose: &SiloPose) -> Self {
+    pub fn new(pose: &SiloPose, bias: DepthBias) -> Self {
         let (sx, cx) = pose.r_x.sin_cos();
         let (sy, cy) = pose.r_y.sin_cos();
         Self {
+            bias,
             rotation: pose.rotation(),
             turned: [
                 Matrix3::new(0.0, cx * sy, -sx * sy, 0.0, -sx, -cx, 0.0, cx * cy, -sx * cy),
@@ -49,13 +52,23 @@ impl Lever {
         self.rotation.column(2).dot(&(Vector3::from(point) - self.translation))
     }
 
+    /// How a point of the silo frame moves with its depth.
+    pub fn ray(&self, point: [f64; 3]) -> [f64; 3] {
+        let depth = self.depth(point);
+        ((Vector3::from(point) - self.translation) / if depth.abs() > 1e-9 { depth } else { 1.0 }).into()
+    }
+
+    /// How much a measured depth changes with the true one.
+    pub fn gain(&self, depth: f64) -> f64 {
+        self.bias.slope(depth)
+    }
+
     /// Derivatives by the parameters of where a measured point comes to lie in the silo frame.
     pub fn shifts(&self, point: [f64; 3]) -> [[f64; 3]; PARAMETERS] {
         let p_camera = self.rotation.transpose() * (Vector3::from(point) - self.translation);
-        let depth = p_camera.z;
-        let ray = self.rotation * p_camera / if depth.abs() > 1e-9 { depth } else { 1.0 };
+        let (depth, ray) = (p_camera.z, Vector3::from(self.ray(point)));
         let [a, b] = self.turned.map(|turned| turned * p_camera);
-        let bias = [1.0, depth, depth * depth].map(|part| (-part * ray).into());
+        let bias = [1.0, depth, depth * depth].map(|part| (-part / self.gain(depth) * ray).into());
         let none = [0.0; 3];
         [a.into(), b.into(), [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], none, none, none, bias[0], bias[1], bias[2]]
     }
@@ -110,11 +123,17 @@ mod tests {
         }
     }
 
+    const BIAS: DepthBias = DepthBias { offset: 3.4397e-3, scale: -0.017878, quadratic: 2.2093e-2 };
+
     /// A measured point under changed parameters, the floor with it.
     fn moved(change: &Parameters, ray: [f64; 2], measured: f64) -> ([f64; 3], Vessel) {
         let pose = SiloPose { r_x: 0.1 + change[0], r_y: -0.2 + change[1], t_x: 0.4 + change[2], t_y: 0.1 + change[3] };
-        let depth = measured - change[7] - change[8] * measured - change[9] * measured * measured;
-        let p = pose.to_silo(&(Vector3::new(ray[0], ray[1], 1.0) * depth));
+        let bias = DepthBias {
+            offset: BIAS.offset + change[7],
+            scale: BIAS.scale + change[8],
+            quadratic: BIAS.quadratic + change[9],
+        };
+        let p = pose.to_silo(&(Vector3::new(ray[0], ray[1], 1.0) * bias.true_depth(measured)));
         let v = vessel();
         let changed = Vessel {
             radius: v.radius + change[4],
@@ -131,7 +150,7 @@ mod tests {
             let pose = SiloPose { r_x: 0.1, r_y: -0.2, t_x: 0.4, t_y: 0.1 };
             let (p, v) = moved(&Parameters::zeros(), [x, y], d);
             prop_assume!(p[0].hypot(p[1]) > 0.05);
-            let by = Lever::new(&pose).thickness(p, &v)[k];
+            let by = Lever::new(&pose, BIAS).thickness(p, &v)[k];
             let h = 1e-6;
             let thickness = |step: f64| {
                 let mut change = Parameters::zeros();

@@ -14,7 +14,7 @@ const ROUNDS: usize = 2;
 const LOOSE: Roughness = Roughness { bend: 1.0, rest: 0.1, range: 0 };
 /// Values tried for the roughness, from which the evidence chooses.
 const BENDS: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
-const RESTS: [f64; 6] = [0.002, 0.005, 0.012, 0.03, 0.07, 0.16];
+const RESTS: [f64; 6] = [0.004, 0.008, 0.016, 0.035, 0.08, 0.16];
 /// Roughness under which two centres are compared, and how much more probable the cells must be about the new one.
 const TRIED: Roughness = Roughness { bend: 0.5, rest: 0.012, range: 0 };
 const GAIN: f64 = 3.0;

@@ -3,6 +3,7 @@
 use super::cells::{Bound, Tally, gather};
 use super::classify::{Classified, Floor, Thing, classify};
 use super::doubt::{Covariance, DEPTH, GEOMETRY, Lever, POSE, Parameters, deviation, share};
+use super::drift::settle;
 use super::fit::Surface;
 use super::grid::Grid;
 use super::returns::{Returns, Source};
@@ -16,6 +17,7 @@ use super::{cells::Cell, detail};
 use crate::sensor::{DepthBias, NoiseLaw};
 use crate::{Result, SiloPose};
 use nalgebra::DVector;
+use std::f64::consts::TAU;
 
 /// What is known before the frame.
 #[derive(Debug, Clone)]
@@ -32,6 +34,8 @@ pub struct Setup {
     pub bias: DepthBias,
     /// The sensor's noise.
     pub noise: NoiseLaw,
+    /// Whether that is the sensor's own noise and no guess.
+    pub noise_known: bool,
     /// Depths that the sensor can measure.
     pub range: [f64; 2],
 }
@@ -95,13 +99,17 @@ pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
     setup.vessel.validate()?;
     let returns = Returns::new(source, setup.bias, &setup.pose, setup.vessel.ovality)?;
     let grid = Grid::over_disc([0.0, 0.0], setup.vessel.radius, returns.len());
-    let lever = Lever::new(&setup.pose);
-    let (cells, tally) = gather(&returns, &bound(setup), &grid, &setup.noise, &lever);
+    let lever = Lever::new(&setup.pose, setup.bias);
+    let bound = bound(setup);
+    let (mut cells, tally) = gather(&returns, &bound, &grid, &setup.noise, &lever);
+    if setup.noise_known {
+        settle(&mut cells, &grid, &bound, &setup.noise, &lever);
+    }
     let floor = Floor { vessel: &setup.vessel, lever: &lever, covariance: &setup.covariance, wall_std: setup.wall_std };
     let Classified { kinds, surface, things, holes, sunken } = classify(&grid, &cells, &floor);
     let volume = surface.as_ref().map(|s| integrate(s, &setup.vessel, &kinds));
     let (doubts, derivatives) = match (&surface, &volume) {
-        (Some(surface), Some(volume)) => doubts(surface, volume, &cells, &lever, &setup.covariance),
+        (Some(surface), Some(volume)) => doubts(surface, volume, &cells, &lever, setup),
         _ => (Doubts::default(), Parameters::zeros()),
     };
     let shape = surface.as_ref().and_then(|s| shape_of(s, &cells, setup.vessel.radius));
@@ -179,13 +187,8 @@ fn influences(surface: &Surface, volume: &Volume) -> (Vec<f64>, DVector<f64>) {
     (all, left)
 }
 
-fn doubts(
-    surface: &Surface,
-    volume: &Volume,
-    cells: &[Cell],
-    lever: &Lever,
-    covariance: &Covariance,
-) -> (Doubts, Parameters) {
+fn doubts(surface: &Surface, volume: &Volume, cells: &[Cell], lever: &Lever, setup: &Setup) -> (Doubts, Parameters) {
+    let covariance = &setup.covariance;
     let (influences, left) = influences(surface, volume);
     let mut derivatives = Parameters::zeros();
     let mut noise = 0.0;
@@ -200,7 +203,7 @@ fn doubts(
     let patch = surface.patch * surface.grid.cell().powi(2);
     let hidden = (volume.area - volume.seen).max(0.0) * patch * surface.roughness.powi(2);
     let unseen = (left.dot(&surface.trend.spread(&left)) - noise).max(0.0) + hidden;
-    let grid = GRID_ERROR * volume.area;
+    let grid = grid_error(&surface.grid, volume, &setup.vessel);
     let known = deviation(&derivatives, covariance).powi(2);
     let out = Doubts {
         pose: share(&derivatives, covariance, POSE),
@@ -214,5 +217,14 @@ fn doubts(
     (out, derivatives)
 }
 
-/// Mean height error that the grid leaves, metres.
-const GRID_ERROR: f64 = 1e-4;
+/// Mean height error that the cells leave, metres.
+const CELL_ERROR: f64 = 3e-5;
+/// Error of the wedge of content under the cells at its rim on the cone, as a share of cell² · slope · length.
+const RIM_ERROR: f64 = 0.005;
+
+/// What the cells leave of the volume, as measured on exact frames.
+fn grid_error(grid: &Grid, volume: &Volume, vessel: &Vessel) -> f64 {
+    let rim = TAU * volume.reach * (1.0 - volume.wall_share);
+    let wedge = grid.cell().powi(2) * vessel.cone_height() / vessel.radius * rim;
+    (CELL_ERROR * volume.area).hypot(RIM_ERROR * wedge)
+}

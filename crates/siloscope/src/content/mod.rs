@@ -6,6 +6,7 @@ pub mod classify;
 pub mod cloud;
 pub mod detail;
 pub mod doubt;
+pub mod drift;
 pub mod fit;
 pub mod grid;
 pub mod measure;
