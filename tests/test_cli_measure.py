@@ -114,6 +114,9 @@ def test_a_dark_frame_has_no_answer(place: Path, capsys: Shown) -> None:
         (["--product", "nothing-like-it"], 2),
         (["--density", "-4"], 2),
         (["--diameter", "9"], 2),
+        (["--top", "9"], 2),
+        (["--top", "nan"], 2),
+        (["--outlet-diameter", "5"], 2),
         (["--strapping", "no.csv"], 3),
         (["--frame", "7"], 3),
         (["--sensor", "no-such-sensor"], 2),
@@ -204,6 +207,11 @@ class TestTrack:
         code, document = run(with_silo(place, "track", str(story)), capsys)
         assert code == 4
         assert document["status"] == "refused"
+
+    def test_frames_that_can_not_be_used_at_all(self, place: Path, tmp_path: Path, capsys: Shown) -> None:
+        write_npy(tmp_path / "0.npy", np.ones((40, 60), np.float32))
+        assert main(with_silo(place, "track", str(tmp_path))) == 3
+        assert "60x40 pixels" in capsys.readouterr().err
 
     @pytest.mark.parametrize("more", [["--interval", "-1"], ["--start", "tomorrow"], ["--parquet"]])
     def test_bad_settings(self, place: Path, capsys: Shown, more: list[str]) -> None:

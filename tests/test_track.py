@@ -15,7 +15,9 @@ from silos import known, scene
 from siloscope.content import Content, Parts
 from siloscope.errors import InputError
 from siloscope.scene import Feed
-from siloscope.track import DAY, _legs, _Moment, _told, utc
+from siloscope.track import _told
+from siloscope.tracking.events import legs
+from siloscope.tracking.story import DAY, Moment, utc
 
 START = 1_772_000_000.0
 
@@ -30,7 +32,7 @@ def story(volumes: list[float | None], hours: float = 1.0, noise: float = 0.002)
             if volume is None
             else Content("ok", volume=volume, volume_std=0.02, parts=parts, capacity=10.0, mass=600.0 * volume)
         )
-        moments.append(_Moment(i, START + 3600.0 * hours * i, content, None))
+        moments.append(Moment(i, START + 3600.0 * hours * i, content, None))
     return _told(moments, None, ())
 
 
@@ -80,21 +82,37 @@ def test_daily_use_counts_what_is_taken_between_refills() -> None:
     assert found.use.daily == pytest.approx(3 * 2.4 / (74.0 / 24.0), rel=0.02)
 
 
+def test_less_than_a_day_tells_no_daily_use() -> None:
+    assert story(list(np.linspace(6.0, 2.0, 24))).use is None
+    assert story(list(np.linspace(6.0, 2.0, 26))).use is not None
+
+
+def test_flow_into_emptiness_weighs_what_was_there() -> None:
+    assert story([2.0, 0.0]).readings[1].mass_flow == pytest.approx(-1.2)
+
+
+def test_only_frames_taken_together_tell_that_the_content_moves() -> None:
+    frames = [scene(Feed("mound", level)).render().frame() for level in (0.45, 0.44)]
+    silo = known(scene(None))
+    for interval, codes in ((60.0, ("filling-in-progress",)), (3600.0, ()), (None, ())):
+        assert siloscope.track(frames, silo, interval=interval).readings[1].quality == codes
+
+
 def test_without_times_there_is_no_use() -> None:
-    moments = [_Moment(i, None, Content("ok", volume=5.0 - i, volume_std=0.1), None) for i in range(4)]
+    moments = [Moment(i, None, Content("ok", volume=5.0 - i, volume_std=0.1), None) for i in range(4)]
     assert _told(moments, None, ()).use is None
 
 
 @given(st.lists(st.floats(0.0, 10.0), min_size=2, max_size=60), st.floats(0.01, 3.0))
 def test_legs_take_turns_and_each_is_large_enough(volumes: list[float], least: float) -> None:
     volume = np.array(volumes)
-    legs = list(_legs(volume, least))
-    assert all(abs(volume[b] - volume[a]) > least and b > a for a, b in legs)
-    signs = [np.sign(volume[b] - volume[a]) for a, b in legs]
+    found = list(legs(volume, least))
+    assert all(abs(volume[b] - volume[a]) > least and b > a for a, b in found)
+    signs = [np.sign(volume[b] - volume[a]) for a, b in found]
     assert all(s != t for s, t in itertools.pairwise(signs))
-    assert all(one[1] == other[0] for one, other in itertools.pairwise(legs))
+    assert all(one[1] == other[0] for one, other in itertools.pairwise(found))
     if np.ptp(volume) <= least:
-        assert legs == []
+        assert found == []
 
 
 def test_a_level_without_a_cone_is_over_the_lowest_point_of_the_story() -> None:

@@ -11,7 +11,8 @@ from siloscope.estimate import Estimate, Ratios, SiloGeometry
 from siloscope.frame import Frame
 from siloscope.locate import locate
 from siloscope.pose import SiloPose
-from siloscope.track import Track, track
+from siloscope.track import track
+from siloscope.tracking.story import Track
 
 __all__ = [
     "Calibration",

@@ -14,9 +14,9 @@ import siloscope
 from siloscope.cli import options
 from siloscope.cli.outcome import REFUSED, print_json, writing
 from siloscope.cli.progress import say
-from siloscope.cli.summary import with_std
 from siloscope.content import Content
 from siloscope.frame import Frame
+from siloscope.wording import with_std
 
 CalibrationFile = Annotated[
     Path | None, typer.Option("--calibration", metavar="FILE", help="What `calibrate` wrote: pose and geometry.")

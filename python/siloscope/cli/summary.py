@@ -9,6 +9,7 @@ from rich.table import Table
 
 from siloscope.calibration import Calibration
 from siloscope.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.wording import with_std
 
 _ROWS = (
     ("r_x", "turn about the camera's x-axis", math.degrees(1.0), "°"),
@@ -30,16 +31,6 @@ def print_estimate(estimate: Estimate, source: str) -> None:
     for line in (tilt_line(estimate), silo_line(estimate.silo, estimate.silo_std), ratios_line(estimate.pixel_ratios)):
         if line:
             console.print(line, markup=False)
-
-
-def with_std(value: float | None, std: float | None, factor: float, unit: str) -> str:
-    """``12.3 ± 0.4 mm`` with as many digits as the deviation deserves."""
-    if value is None:
-        return "not seen"
-    if std is None or not math.isfinite(std):
-        return f"{value * factor:.4g}{unit}"
-    digits = 0 if std <= 0.0 else min(9, max(0, 1 - math.floor(math.log10(std * factor))))
-    return f"{value * factor:.{digits}f} ± {std * factor:.{digits}f}{unit}"
 
 
 def pose_table(estimate: Estimate | Calibration) -> Table:

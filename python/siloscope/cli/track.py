@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -19,10 +20,14 @@ from siloscope.cli.progress import say
 from siloscope.cli.progress import track as bar
 from siloscope.errors import UsageError
 from siloscope.frames import FrameSource
-from siloscope.track import Reading, Track
+from siloscope.tracking.story import Reading, Track
+from siloscope.wording import with_std
 
 SHOWN = 40
 """Readings that the table on a terminal has; files have all."""
+
+WIDTH = 160
+"""Columns of text that goes into a file or a pipe."""
 
 
 def track(
@@ -89,7 +94,7 @@ def track(
 
 def _answer(found: Track, out: Path | None, parquet: bool, lines: bool, as_json: bool) -> int:
     if out is not None:
-        from siloscope.track_files import write_track
+        from siloscope.tracking.page import write_track
 
         with writing(out):
             written = write_track(out, found, parquet)
@@ -127,38 +132,40 @@ def _time(text: str | None) -> float | None:
 
 def _print(found: Track) -> None:
     """The table of readings, the events, and the forecast on stdout."""
-    from siloscope.track_files import when
+    from siloscope.tracking.page import moment, when
 
-    console = Console(highlight=False, soft_wrap=True)
+    console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else WIDTH)
     table = Table(box=None, padding=(0, 2, 0, 0))
-    for name, side in (("time", "left"), ("volume (m³)", "right"), ("level (m)", "right"), ("mass (kg)", "right"),
-                       ("flow (m³/h)", "right"), ("", "left")):  # fmt: skip
-        table.add_column(name, justify=side, style="bold" if name == "time" else None)  # type: ignore[arg-type]
+    table.add_column("time", style="bold", no_wrap=True)
+    weighed = any(reading.mass is not None for reading in found.readings)
+    for name in ("volume (m³)", "level (m)", "mass (kg)", f"flow ({'t' if weighed else 'm³'}/h)"):
+        table.add_column(name, justify="right", no_wrap=True)
+    table.add_column("", overflow="fold")
     for reading in found.readings[-SHOWN:]:
-        table.add_row(*_row(reading))
+        table.add_row(*_row(reading, weighed))
     console.print(table)
     if len(found.readings) > SHOWN:
         say(f"{len(found.readings) - SHOWN} earlier readings not shown; --out, --json and --jsonl have all")
     for event in found.events:
         mass = "" if event.mass is None else f", {event.mass:.0f} kg"
-        begin = when(event.start) if event.start is not None else f"reading {event.first}"
-        console.print(
-            f"{event.kind} of {event.volume:.3f} ± {event.volume_std:.3f} m³{mass} from {begin}", markup=False
-        )
+        amount = with_std(event.volume, event.volume_std, 1.0, " m³")
+        begin, end = moment(event.start, event.first), moment(event.end, event.last)
+        console.print(f"{event.kind} of {amount}{mass}, {begin} to {end}", markup=False)
     if found.use is not None:
         use = found.use
+        daily = with_std(use.daily, use.daily_std, 1.0, " m³")
         band = f"between {when(use.earliest)} and {when(use.latest)}"
-        console.print(f"use {use.daily:.3f} ± {use.daily_std:.3f} m³ a day; empty by {when(use.empty_by)}, {band}",
-                      markup=False)  # fmt: skip
+        console.print(f"use {daily} a day; empty by {when(use.empty_by)}, {band}", markup=False)
 
 
-def _row(reading: Reading) -> tuple[str, ...]:
-    from siloscope.track_files import when
+def _row(reading: Reading, weighed: bool) -> tuple[str, ...]:
+    from siloscope.tracking.page import when
 
     def number(value: float | None, digits: int) -> str:
         return "" if value is None else f"{value:.{digits}f}"
 
-    volume = "" if reading.volume is None else f"{reading.volume:.3f} ± {reading.volume_std:.3f}"
+    volume = "" if reading.volume is None else with_std(reading.volume, reading.volume_std, 1.0, "")
     remark = ", ".join(reading.quality) if reading.status == "ok" else f"{reading.status}: {reading.reason}"
     time = reading.name if reading.time is None else when(reading.time)
-    return (time, volume, number(reading.level, 3), number(reading.mass, 0), number(reading.flow, 3), remark)
+    flow = reading.mass_flow if weighed else reading.flow
+    return (time, volume, number(reading.level, 3), number(reading.mass, 0), number(flow, 3), remark)

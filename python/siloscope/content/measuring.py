@@ -215,9 +215,18 @@ def _silo(known: Knowledge, sheet: Datasheet) -> tuple[float, ...]:
     bottom, apex = geometry.cylinder_bottom, geometry.apex
     if bottom is None or apex is None:
         bottom = apex = BOTTOMLESS
-    outlet = min(sheet.outlet_diameter / 2.0, 0.9 * geometry.radius)
-    top = min(known.lengths.top, apex - 1e-3)
-    return geometry.radius, bottom, apex, top, outlet, sheet.outlet_length, *known.ovality
+    if sheet.outlet_diameter >= 2.0 * geometry.radius:
+        raise UsageError(
+            f"an outlet of {sheet.outlet_diameter:g} m does not fit a silo of {2.0 * geometry.radius:.3f} m; "
+            "give --outlet-diameter in metres"
+        )
+    if known.lengths.top >= apex:
+        raise UsageError(
+            f"the upper edge at {known.lengths.top:g} m below the camera lies under the cone's vertex at {apex:.3f} m; "
+            "--top is negative above the camera"
+        )
+    outlet = sheet.outlet_diameter / 2.0
+    return geometry.radius, bottom, apex, known.lengths.top, outlet, sheet.outlet_length, *known.ovality
 
 
 def _content(

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from siloscope.content.result import Content
 from siloscope.content.surface_map import SurfaceMap
 from siloscope.plots.style import AMBER, BLUE, GREEN, INK, MUTED, RED, RULE, figure, heading, legend, tidy
+from siloscope.wording import with_std
 
 Numbers = NDArray[np.float64]
 
@@ -139,21 +140,23 @@ def trend(
     events: Sequence[tuple[Any, Any, float]] = (),
     forecast: tuple[Sequence[Any], Numbers, Numbers, Numbers] | None = None,
     capacity: float | None = None,
+    label: str = "time (h)",
+    quantity: str = "volume (m³)",
 ) -> Figure:
     """Volume over time with its 95 % band, refills and withdrawals, and the forecast.
 
-    `times` are datetimes or hours; NaN volumes are refused readings. `events` are (start, end, m³), `forecast` is
-    (times, middle, low, high).
+    `times` are datetimes, or numbers that `label` names; NaN volumes are refused readings. `events` are
+    (start, end, m³), `forecast` is (times, middle, low, high).
     """
     made = figure(12.0, 5.2)
     axes = made.subplots()
     known = np.isfinite(volume)
     at = np.asarray(times)
     for start, end, amount in events:
-        axes.axvspan(start, end, color=GREEN if amount > 0 else RED, alpha=0.12, linewidth=0)
+        axes.axvspan(start, end, color=GREEN if amount > 0 else RED, alpha=0.14 if amount > 0 else 0.07, linewidth=0)
     axes.fill_between(at[known], (volume - 2 * std)[known], (volume + 2 * std)[known], color=BLUE, alpha=0.2,
                       linewidth=0, label="95 % band")  # fmt: skip
-    axes.plot(at[known], volume[known], color=BLUE, linewidth=1.6, marker="o", markersize=3, label="volume")
+    axes.plot(at[known], volume[known], color=BLUE, linewidth=1.6, marker="o", markersize=3, label=quantity.split()[0])
     if (~known).any():
         axes.plot(at[~known], np.zeros(int((~known).sum())), "x", color=RED, label="no answer")
     if forecast is not None:
@@ -163,14 +166,13 @@ def trend(
     if capacity is not None:
         axes.axhline(capacity, color=MUTED, linewidth=0.9, linestyle=":", label="capacity")
     axes.set_ylim(bottom=0.0)
-    dated = len(at) > 0 and not isinstance(at[0], int | float | np.number)
-    if dated:
+    if len(at) and not isinstance(at[0], int | float | np.number):
         locator = AutoDateLocator()  # type: ignore[no-untyped-call]
         axes.xaxis.set_major_locator(locator)
         axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))  # type: ignore[no-untyped-call]
-    tidy(axes, "volume (m³); green: refill, red: withdrawal", "" if dated else "time (h)")
+    tidy(axes, f"{quantity}; green: refill, red: withdrawal", label)
     legend(axes, columns=5)
-    heading(made, _trend_headline(volume[known], std[known]))
+    heading(made, _trend_headline(volume[known], std[known], quantity.split("(")[1].rstrip(")")))
     return made
 
 
@@ -179,8 +181,7 @@ def headline(content: Content) -> str:
     if content.volume is None or content.volume_std is None:
         return f"{content.source}: level without volume; missing {', '.join(content.missing)}"
     fill = "" if content.fill_fraction is None else f", {100 * content.fill_fraction:.1f} % full"
-    digits = max(2, min(6, 1 - math.floor(math.log10(max(content.volume_std, 1e-6)))))
-    return f"{content.volume:.{digits}f} ± {content.volume_std:.{digits}f} m³{fill}"
+    return with_std(content.volume, content.volume_std, 1.0, f" m³{fill}")
 
 
 def pictures(content: Content) -> dict[str, Figure]:
@@ -190,10 +191,11 @@ def pictures(content: Content) -> dict[str, Figure]:
     return {"height-map": height_map(content), "surface": surface_3d(content), "section": section(content)}
 
 
-def _trend_headline(volume: Numbers, std: Numbers) -> str:
+def _trend_headline(volume: Numbers, std: Numbers, unit: str) -> str:
     if not len(volume):
         return "No reading has an answer"
-    return f"From {volume[0]:.2f} to {volume[-1]:.2f} ± {std[-1]:.2f} m³ in {len(volume)} readings"
+    first, last = (with_std(float(volume[i]), float(std[i]), 1.0, f" {unit}") for i in (0, -1))
+    return f"From {first} to {last} in {len(volume)} readings"
 
 
 def _parts(content: Content) -> tuple[SurfaceMap, _Silo]:

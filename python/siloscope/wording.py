@@ -1,0 +1,15 @@
+"""Numbers as people read them."""
+
+from __future__ import annotations
+
+import math
+
+
+def with_std(value: float | None, std: float | None, factor: float, unit: str) -> str:
+    """``12.3 ± 0.4 mm`` with as many digits as the deviation deserves."""
+    if value is None:
+        return "not seen"
+    if std is None or not math.isfinite(std):
+        return f"{value * factor:.4g}{unit}"
+    digits = 0 if std <= 0.0 else min(9, max(0, 1 - math.floor(math.log10(std * factor))))
+    return f"{value * factor:.{digits}f} ± {std * factor:.{digits}f}{unit}"
