@@ -211,7 +211,7 @@ class TestTrack:
     def test_frames_that_can_not_be_used_at_all(self, place: Path, tmp_path: Path, capsys: Shown) -> None:
         write_npy(tmp_path / "0.npy", np.ones((40, 60), np.float32))
         assert main(with_silo(place, "track", str(tmp_path))) == 3
-        assert "60x40 pixels" in capsys.readouterr().err
+        assert "60 x 40" in capsys.readouterr().err
 
     @pytest.mark.parametrize("more", [["--interval", "-1"], ["--start", "tomorrow"], ["--parquet"]])
     def test_bad_settings(self, place: Path, capsys: Shown, more: list[str]) -> None:
