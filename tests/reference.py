@@ -169,18 +169,18 @@ def rotation(X: Array) -> Array:
     return np.array([[cy, sx * sy, cx * sy], [0, cx, -sx], [-sy, sx * cy, cx * cy]])
 
 
-def axis_points(points: Array, normal: Array, X: Array, partners: int = 100) -> Array:
+def axis_points(points: Array, normal: Array, X: Array, partners: int = 100, planes: int = 1500) -> Array:
     """Points where the lines p' + λN' meet the planes π(p, X, N), projected into the plane through the origin (Eq. 4).
 
     Partners p' are the quarter with the greatest |(N × X)·N'| of 4 `partners` evenly spread candidates; of more than
-    1500 candidates only so many, evenly spread, lend their planes.
+    `planes` candidates only so many, evenly spread, lend their planes.
     """
-    pool, planes = (
+    pool, lending = (
         np.array([i * len(points) // n for i in range(n)], dtype=int)
-        for n in (min(4 * partners, len(points)), min(1500, len(points)))
+        for n in (min(4 * partners, len(points)), min(planes, len(points)))
     )
     estimates = []
-    for p, N in zip(points[planes], normal[planes], strict=True):
+    for p, N in zip(points[lending], normal[lending], strict=True):
         across = np.cross(N, X)
         best = pool[np.argsort(-np.abs(normal[pool] @ across), kind="stable")]
         for j in best[: int(np.ceil(len(pool) / 4))]:

@@ -184,7 +184,8 @@ def _made(every: int, repeats: int) -> str:
     frames = len(list(scenes())[::every])
     return "\n".join(
         [
-            f"- Frames: {frames} scenes, each as a whole and with its walls alone; {repeats} runs a method, other seeds.",
+            f"- Frames: {frames} scenes, each as a whole and with its walls alone; {repeats} runs a method, each with "
+            "a seed of its own.",
             "- Columns in mm are medians of the PC average distance (Eq. 11) on the whole frame by kind of frame; a "
             f"failure is no answer or more than {1e3 * FAILURE:g} mm. {_exceptions()}",
             "- Times are processor time on one core, from depths in memory to the axis; what is known beforehand "
