@@ -9,6 +9,7 @@ import numpy as np
 
 from siloscope.paper.discharges import EXACT
 from siloscope.paper.scenarios import LIDAR, LIDAR_NOISE, looking_at, scenario
+from siloscope.paper.solvers import ALL, GROWN
 from siloscope.paper.trials import Trial
 from siloscope.pose import SiloPose
 from siloscope.scene import ASTRA, ASTRA_S, PERFECT, Feed, Scene, SensorModel, Silo, sensor_model
@@ -95,7 +96,7 @@ def large(eye: Eye, scale: float, count: int) -> list[Trial]:
     if scale > eye.most:
         return []
     scene = replace(enlarged(scenario("silo1"), scale), sensor=eye.sensor, camera=LIDAR if eye.lidar else ASTRA)
-    return [Trial(replace(scene, seed=seed), eye.profile) for seed in range(count)]
+    return [Trial(replace(scene, seed=seed), eye.profile, (*ALL, GROWN.name)) for seed in range(count)]
 
 
 def enlarged(scene: Scene, scale: float) -> Scene:

@@ -20,6 +20,8 @@ class Solver:
     method: str
     knows_diameter: bool = False
     knows_profile: bool = False
+    grid_per_radius: float | None = None
+    """Side of the voxels in radii of the silo; None for the method's own."""
 
     def __call__(self, frame: SimulatedFrame, profile: SensorProfile, **more: Any) -> Estimate:
         """The pose of a frame taken with a sensor of this profile."""
@@ -28,6 +30,8 @@ class Solver:
             known["diameter"] = 2.0 * frame.scene.silo.radius
         if self.knows_profile:
             known["sensor"] = profile
+        if self.grid_per_radius is not None:
+            known["grid"] = self.grid_per_radius * frame.scene.silo.radius
         return locate(frame.measured, frame.camera, method=self.method, **known)
 
 
@@ -41,6 +45,12 @@ SOLVERS = {
     )
 }
 """Solvers by name, in the tables' order; plain `surface` knows neither diameter nor profile."""
+
+GROWN = Solver("shape-tensor-grown", "shape-tensor, grid grown with the silo", "shape-tensor", grid_per_radius=0.04)
+"""For silos larger than the paper's: in its Silo1 this is the paper's grid of 5 cm."""
+
+KNOWN = {**SOLVERS, GROWN.name: GROWN}
+"""Everything that a trial can ask for."""
 
 ALL = tuple(SOLVERS)
 SURFACE = tuple(name for name, solver in SOLVERS.items() if solver.method == "surface")

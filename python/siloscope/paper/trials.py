@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from siloscope.estimate import Estimate, Ratios, SiloGeometry
 from siloscope.paper import metrics
 from siloscope.paper.packing import packed, unpacked
-from siloscope.paper.solvers import ALL, SOLVERS
+from siloscope.paper.solvers import ALL, KNOWN
 from siloscope.pose import SiloPose
 from siloscope.scene import Scene, SimulatedFrame
 from siloscope.sensors import SensorProfile
@@ -68,7 +68,7 @@ class Trial:
 
 def _timed(name: str, frame: SimulatedFrame, profile: SensorProfile) -> tuple[Estimate, float]:
     start = time.perf_counter()
-    estimate = SOLVERS[name](frame, profile)
+    estimate = KNOWN[name](frame, profile)
     return estimate, time.perf_counter() - start
 
 
@@ -146,7 +146,7 @@ class Observation:
     @classmethod
     def of(cls, trial: Trial, data: Mapping[str, Any]) -> Observation:
         """From a trial and what it gave."""
-        answers = {name: Answer.of(SOLVERS[name].method, answer) for name, answer in data["answers"].items()}
+        answers = {name: Answer.of(KNOWN[name].method, answer) for name, answer in data["answers"].items()}
         return cls(trial.scene, Ratios(**data["pixels"]), Ratios(**data["area"]), data["seen"], answers)
 
     @property

@@ -48,6 +48,29 @@ def wrong_answers(series: Sequence[Series]) -> str:
     )
 
 
+ENOUGH = 0.8
+"""Share of covered errors below which the stated deviations are called too small."""
+
+
+def too_small(series: Sequence[Series], why: str) -> str:
+    """A sentence on stated deviations that are too small, and why they are."""
+    short = {one.name: [SOLVERS[name].heading for name in SOLVERS if _is_short(one, name)] for one in series}
+    told = [f"{listed([f'`{name}`' for name in names])} in {silo}" for silo, names in short.items() if names]
+    if not told:
+        return f"Nowhere are fewer than {100.0 * ENOUGH:g} % covered."
+    return f"Too small, with fewer than {100.0 * ENOUGH:g} % covered, are the deviations of {'; '.join(told)}. {why}"
+
+
+def _is_short(series: Series, solver: str) -> bool:
+    share = covered(series, solver)
+    return share is not None and share < ENOUGH
+
+
+def answered(series: Series, solver: str) -> str:
+    """In how many frames there was an answer at all."""
+    return f"Answered in {len(series.answered(solver))} of {len(series.level)} frames, refused in the others."
+
+
 def covered(series: Series, solver: str) -> float | None:
     """Share of errors within two standard deviations; None where nothing was answered."""
     ratio = np.abs(series.error(solver)) / series.std(solver)

@@ -11,7 +11,7 @@ from siloscope.paper.evaluation import published
 from siloscope.paper.evaluation.adjustments import Adjusted
 from siloscope.paper.evaluation.chapter import Chapter, Verdict
 from siloscope.paper.evaluation.fusing import columns, fusion
-from siloscope.paper.evaluation.honesty import coverage, wrong_answers
+from siloscope.paper.evaluation.honesty import coverage, too_small, wrong_answers
 from siloscope.paper.evaluation.pictures import clouds, curves
 from siloscope.paper.evaluation.plan import Plan
 from siloscope.paper.evaluation.series import LAST, Series
@@ -24,6 +24,11 @@ The same silos with the depth error of Eqs. 8 to 10 (Orbbec Astra S): a bias tha
 noise. As in the paper, the table has the mean of the last {LAST} estimates; the columns "fused" have the information
 fusion of the whole discharge, which is what `siloscope calibrate` does. "Profile known" means that Eqs. 8 and 9 are
 told to the program; "diameter known" that a tape's reading of the diameter is.
+"""
+
+UNSEEN_BIAS = """
+A depth bias that is not told moves all points of a wall alike, so no disagreement within the frame shows it: the
+deviations are those of the noise.
 """
 
 EMPTYING = 0.35
@@ -48,6 +53,7 @@ def chapter(plan: Plan, results: Results) -> Chapter:
             adjusted.table("table4", title, published.TABLE4, ""),
             coverage("table4-coverage", "Answers and honesty, perturbed silos", series),
             wrong_answers(series),
+            too_small(series, UNSEEN_BIAS),
             curves("fig11", "Fig. 11: errors, shares and distances over the discharge.", series, "Perturbed silos"),
             clouds(
                 "fig12",

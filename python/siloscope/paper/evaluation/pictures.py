@@ -7,10 +7,18 @@ from typing import TYPE_CHECKING
 
 from siloscope.paper.evaluation.chapter import Picture
 from siloscope.paper.evaluation.series import Series
+from siloscope.paper.evaluation.tables import LEAST
 from siloscope.pose import SiloPose
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+
+READING = (
+    "Grey: every method of the panel refuses. A panel of errors is cut where a full silo's few wild steps would "
+    f"flatten the rest; distances below {LEAST:g} mm are drawn at it."
+)
+"""How to read the curves."""
 
 
 def curves(name: str, caption: str, series: Sequence[Series], title: str) -> Picture:
@@ -21,7 +29,7 @@ def curves(name: str, caption: str, series: Sequence[Series], title: str) -> Pic
 
         return figures.discharges(series, title)
 
-    return Picture(name, caption, draw)
+    return Picture(name, f"{caption} {READING}", draw)
 
 
 def clouds(

@@ -8,8 +8,9 @@ from itertools import cycle
 import numpy as np
 from matplotlib.figure import Figure
 
-from siloscope.paper.evaluation.figures.look import COLOURS, LEAST, decades
+from siloscope.paper.evaluation.figures.look import COLOURS, decades
 from siloscope.paper.evaluation.series import Numbers
+from siloscope.paper.evaluation.tables import LEAST
 from siloscope.paper.solvers import SOLVERS
 from siloscope.plots.style import AMBER, BLUE, GREEN, GREY, MUTED, figure, heading, legend, tidy
 

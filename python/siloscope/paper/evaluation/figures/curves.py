@@ -60,7 +60,7 @@ def _errors(axes: Axes, series: Series, columns: tuple[int, int], label: str) ->
     axes.axhline(0.0, color=INK, linewidth=0.7)
     shown = 1e3 * series.error("shape-tensor")[:, list(columns)]
     _limit(axes, shown[np.isfinite(shown)])
-    _refused(axes, series)
+    _refused(axes, series, [solver for solver, _ in COMPARED])
     _run_down(axes, series, label)
 
 
@@ -87,15 +87,15 @@ def _distances(axes: Axes, series: Series) -> None:
     for name, solver in SOLVERS.items():
         distance = millimetres(series.distance(name))
         axes.semilogy(100.0 * series.level, distance, color=COLOURS[name], linewidth=1.3, label=solver.heading)
-    _refused(axes, series)
+    _refused(axes, series, list(SOLVERS))
     _run_down(axes, series, "PC average distance (mm)")
     axes.set_xlabel("feed level (% of the height)", fontsize=9, color=MUTED)
     decades(axes)
 
 
-def _refused(axes: Axes, series: Series) -> None:
+def _refused(axes: Axes, series: Series, drawn: Sequence[str]) -> None:
     """Grey where every drawn method refused."""
-    silent = np.all([np.isnan(series.distance(solver)) for solver, _ in COMPARED], axis=0)
+    silent = np.all([np.isnan(series.distance(solver)) for solver in drawn], axis=0)
     level = 100.0 * series.level
     half = 0.5 * float(np.median(np.abs(np.diff(level)))) if len(level) > 1 else 1.0
     for place in level[silent]:

@@ -9,17 +9,15 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 from numpy.typing import NDArray
 
+from siloscope.paper.evaluation.tables import LEAST
 from siloscope.plots.style import BLUE, GREEN, INK, PURPLE, RED
 
 COLOURS = {"shape-tensor": RED, "surface": BLUE, "surface-diameter": GREEN, "surface-profile": PURPLE}
 """One colour a method, in every figure."""
 
-LEAST = 1e-3
-"""Distances below this many millimetres are drawn at it."""
-
 
 def millimetres(distance: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Distances in m as they are drawn on a logarithmic axis."""
+    """Distances in m as they are drawn on a logarithmic axis: those below `LEAST` mm at it."""
     drawn: NDArray[np.float64] = np.maximum(1e3 * distance, LEAST)
     return drawn
 
