@@ -44,7 +44,7 @@ pub struct Sensor {
     pub max_incidence: f64,
     /// Share of pixels that give no measurement for no visible reason.
     pub dropout: f64,
-    /// Size of the patches in which they are lost, pixels; 0 for single pixels.
+    /// Size of the patches in which they are lost, pixels; below 1 for single pixels.
     pub dropout_length: f64,
     /// Distance from the projector or second imager, to the left; the band of the image that it does not see, `fx·baseline`
     /// pixels at 1 m, gives no measurement.
@@ -161,7 +161,7 @@ impl Sensor {
         }
         let mut out = Measured { depth: vec![0.0; pixels], false_returns: vec![false; pixels] };
         let band = camera.height.div_ceil(threads) * camera.width;
-        let pass = Pass { sensor: self, exact, camera, seed };
+        let pass = &Pass { sensor: self, exact, camera, seed, lattices: self.lattices(camera, seed) };
         std::thread::scope(|scope| {
             for (part, (depth, flags)) in out.depth.chunks_mut(band).zip(out.false_returns.chunks_mut(band)).enumerate()
             {
@@ -173,13 +173,74 @@ impl Sensor {
     }
 }
 
+impl Sensor {
+    /// Whether pixels are lost in patches; one that is no longer than a pixel is a pixel.
+    fn loses_patches(&self) -> bool {
+        self.dropout > 0.0 && self.dropout_length >= 1.0
+    }
+
+    /// The smooth random fields of a frame.
+    fn lattices(&self, camera: &Camera, seed: u64) -> Lattices {
+        let field = |wanted: bool, seed, purpose: Purpose, pitch: f64| {
+            let stream = Stream::new(seed, purpose as u64);
+            if wanted { Lattice::new(stream, pitch, camera) } else { Lattice::default() }
+        };
+        Lattices {
+            common: field(self.correlation != 0.0, seed, Purpose::Common, self.correlation_length),
+            dropout: field(self.loses_patches(), seed, Purpose::Dropout, self.dropout_length),
+            warp: field(self.warp > 0.0, self.warp_seed, Purpose::Warp, self.warp_length),
+        }
+    }
+}
+
+/// Smooth random fields; those that a sensor has no use for are empty.
+struct Lattices {
+    common: Lattice,
+    dropout: Lattice,
+    warp: Lattice,
+}
+
+/// A smooth random field over the image: a B-spline over random values on a lattice.
+#[derive(Default)]
+struct Lattice {
+    pitch: f64,
+    columns: usize,
+    values: Vec<f64>,
+}
+
+impl Lattice {
+    fn new(stream: Stream, pitch: f64, camera: &Camera) -> Self {
+        // A spline reaches over four sites.
+        let sites = |pixels: usize| (pixels as f64 / pitch) as usize + 4;
+        let (columns, rows) = (sites(camera.width), sites(camera.height));
+        let site = |i: usize| ((i / columns) as u64) << 32 | (i % columns) as u64;
+        let values = (0..columns * rows).map(|i| stream.normal(site(i))).collect();
+        Self { pitch, columns, values }
+    }
+
+    /// The field at column u and row v, scaled to variance 1 at every pixel.
+    fn at(&self, u: f64, v: f64) -> f64 {
+        let (u, v) = (u / self.pitch, v / self.pitch);
+        let (wx, wy) = (spline(u.fract()), spline(v.fract()));
+        let (mut sum, mut power) = (0.0, 0.0);
+        for (j, wy) in wy.iter().enumerate() {
+            let first = (v as usize + j) * self.columns + u as usize;
+            for (wx, value) in wx.iter().zip(self.values.iter().skip(first)) {
+                sum += wx * wy * value;
+                power += wx * wy * wx * wy;
+            }
+        }
+        sum / power.sqrt()
+    }
+}
+
 /// One frame through one sensor.
-#[derive(Clone, Copy)]
 struct Pass<'a> {
     sensor: &'a Sensor,
     exact: &'a Exact,
     camera: &'a Camera,
     seed: u64,
+    lattices: Lattices,
 }
 
 /// What the random streams are for.
@@ -241,8 +302,8 @@ impl Pass<'_> {
         let sensor = self.sensor;
         let mut error = 0.0;
         if sensor.warp > 0.0 {
-            let stream = Stream::new(sensor.warp_seed, Purpose::Warp as u64);
-            error += sensor.warp * d * d * self.field(stream, sensor.warp_length, pixel);
+            let (u, v) = self.place(pixel);
+            error += sensor.warp * d * d * self.lattices.warp.at(u, v);
         }
         if sensor.bowl != 0.0 {
             let (u, v) = self.place(pixel);
@@ -260,11 +321,11 @@ impl Pass<'_> {
         if sensor.baseline > 0.0 && self.place(pixel).0 * depth < self.camera.fx * sensor.baseline {
             return true;
         }
-        if sensor.dropout == 0.0 || sensor.dropout_length == 0.0 {
+        if !sensor.loses_patches() {
             return self.happens(Purpose::Dropout, sensor.dropout, pixel);
         }
-        let field = self.field(self.stream(Purpose::Dropout), sensor.dropout_length, pixel);
-        normal_share(field) < sensor.dropout
+        let (u, v) = self.place(pixel);
+        normal_share(self.lattices.dropout.at(u, v)) < sensor.dropout
     }
 
     /// Column and row.
@@ -288,23 +349,8 @@ impl Pass<'_> {
     }
 
     fn common_noise(&self, pixel: usize) -> f64 {
-        self.field(self.stream(Purpose::Common), self.sensor.correlation_length, pixel)
-    }
-
-    /// A smooth random field: a B-spline over random values on a lattice, scaled to variance 1 at every pixel.
-    fn field(&self, stream: Stream, pitch: f64, pixel: usize) -> f64 {
         let (u, v) = self.place(pixel);
-        let (u, v) = (u / pitch, v / pitch);
-        let (wx, wy) = (spline(u.fract()), spline(v.fract()));
-        let (mut sum, mut power) = (0.0, 0.0);
-        for (j, wy) in wy.iter().enumerate() {
-            for (i, wx) in wx.iter().enumerate() {
-                let site = ((v as u64 + j as u64) << 32) | (u as u64 + i as u64);
-                sum += wx * wy * stream.normal(site);
-                power += wx * wy * wx * wy;
-            }
-        }
-        sum / power.sqrt()
+        self.lattices.common.at(u, v)
     }
 
     /// Depth of a dust grain or of a flying pixel, where there is one.

@@ -53,7 +53,7 @@ class SensorModel:
     dropout: float = 0.0
     """Share of pixels lost for no visible reason."""
     dropout_length: float = 0.0
-    """Size of the patches in which they are lost, pixels; 0 for single pixels."""
+    """Size of the patches in which they are lost, pixels; below 1 for single pixels."""
     baseline: float = 0.0
     """Distance to the projector or second imager: the left ``fx·baseline/depth`` columns give no measurement."""
     flying: float = 0.0
