@@ -107,7 +107,36 @@ def said(results: Sequence[Result]) -> str:
             best = min(rivals, key=lambda m: rivals[m])
             ours = ", ".join(f"{_named(m)} {number(value)}" for m, value in mine.items())
             lines.append(f"- **{kind}**: {ours} mm; nearest peer: {_named(best)} {number(rivals[best])} mm.")
-    return "\n".join(["Median PC average distance on whole frames:", "", *lines, "", _times(results)])
+    told = ["Median PC average distance on whole frames:", "", *lines, "", _nearer(results), "", _times(results)]
+    return "\n".join(told)
+
+
+WHY = """
+PCL and CGAL end with the wall's own equation, PCL with least squares over all its points; the six steps end with
+curvatures on a grid of five centimetres, of which exact depths leave that much. `surface` is our fit of the wall. A
+refusal counts as a failure here, whoever refuses; ours come with a reason.
+"""
+
+
+def _nearer(results: Sequence[Result]) -> str:
+    """Where a peer that is told no geometry beats one of ours, and why."""
+    rivals = [m for m in METHODS if not _ours(m) and "radius" not in m.told]
+    lines = [
+        f"`{_named(mine)}` on {kind}: {', '.join(nearer)}"
+        for mine in METHODS
+        if _ours(mine)
+        for kind in KINDS
+        if (nearer := [_named(m) for m in rivals if _beats(results, m, mine, kind)])
+    ]
+    if not lines:
+        return "No peer that is told no geometry is nearer than any of ours on any kind of frame."
+    return f"Where peers are nearer: {'; '.join(lines)}. {' '.join(WHY.split())}"
+
+
+def _beats(results: Sequence[Result], rival: Method, mine: Method, kind: str) -> bool:
+    """Whether the rival is nearer in the median; one without an answer is infinitely far."""
+    theirs, ours = (_of(results, m, kind) for m in (rival, mine))
+    return theirs is not None and (ours is None or theirs < ours)
 
 
 def _times(results: Sequence[Result]) -> str:
@@ -151,17 +180,33 @@ def _panel(axes: Any, results: Sequence[Result], kind: str) -> None:
 
     from siloscope.plots.style import BLUE, INK, MUTED, tidy
 
+    labels: list[tuple[tuple[float, float], list[int]]] = []
     for place, method in enumerate(METHODS, start=1):
         own = [r for r in results if r.method is method and r.frame.part == "whole" and r.frame.kind == kind]
         distance = _median([value for r in own for value in r.off])
         if distance is not None:
             at = (float(np.median([run.ms for r in own for run in r.found])), max(distance, 1e-3))
             axes.loglog(*at, "o", color=BLUE if _ours(method) else MUTED, markersize=6)
-            offset = ((5, 3), (5, -10), (-14, 3), (-14, -10))[place % 4]
-            axes.annotate(str(place), at, xytext=offset, textcoords="offset points", fontsize=9, color=INK)
+            _label(labels, at, place)
+    for at, places in labels:
+        names = ", ".join(str(place) for place in places)
+        axes.annotate(names, at, xytext=(5, 3), textcoords="offset points", fontsize=9, color=INK)
     tidy(axes, kind, "processor time (ms)", "median PC average distance (mm)")
     for scale in (axes.xaxis, axes.yaxis):
         scale.set_major_formatter(StrMethodFormatter("{x:g}"))
+
+
+NEAR = (0.12, 0.16)
+"""Points within these parts of a decade share a label, or their numbers would lie over each other."""
+
+
+def _label(labels: list[tuple[tuple[float, float], list[int]]], at: tuple[float, float], place: int) -> None:
+    """Adds a method's number to the label of its point or of one next to it."""
+    for other, places in labels:
+        if all(abs(np.log10(a / b)) < near for a, b, near in zip(at, other, NEAR, strict=True)):
+            places.append(place)
+            return
+    labels.append((at, [place]))
 
 
 def page(results: Sequence[Result], every: int, repeats: int) -> str:
