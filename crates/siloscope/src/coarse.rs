@@ -11,16 +11,22 @@ use crate::verdict::{WallEvidence, wall_evidence};
 /// A cone that rises less than 36° could as well be feed lying at its angle of repose, unless feed lies in it.
 pub(crate) const FEED_SLOPE: f64 = 1.376;
 
+/// A fit on patches that stands up to the evidence.
+#[derive(Debug, Clone)]
+pub struct Settled {
+    /// The fit.
+    pub fit: Fit,
+    /// Which patches are wall.
+    pub wall: Vec<bool>,
+    /// What they look like.
+    pub evidence: WallEvidence,
+}
+
 /// Refines every start value on a few patches; the likeliest that stands up to the evidence is refined on more.
 ///
 /// The depth scale stays fixed here: it trades against the silo's size along a curve on which Gauss–Newton steps crawl.
 /// A known radius then moves the answer along that curve exactly.
-pub fn coarse_fit(
-    patches: &mut Patches,
-    noise: NoiseLaw,
-    prior: &Prior,
-    pixel: f64,
-) -> Result<(Fit, WallEvidence), Refusal> {
+pub fn coarse_fit(patches: &mut Patches, noise: NoiseLaw, prior: &Prior, pixel: f64) -> Result<Settled, Refusal> {
     let free_size = Prior { radius: prior.radius.filter(|_| prior.bias_std[1] == 0.0), ..prior.clone() };
     if patches.cloud {
         let found = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Unknown);
@@ -39,7 +45,7 @@ fn best_settled(
     noise: NoiseLaw,
     (prior, pixel): (&Prior, f64),
     mut candidates: Vec<(f64, Fit)>,
-) -> Result<(Fit, WallEvidence), Refusal> {
+) -> Result<Settled, Refusal> {
     candidates.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut refusal = Refusal::NoWall;
     for (rank, (_, mut fit)) in candidates.into_iter().take(4).enumerate() {
@@ -58,7 +64,13 @@ fn best_settled(
 
 /// Start values after a few steps, each with its likelihood.
 fn candidates(problem: &Problem, view: View) -> Vec<(f64, Fit)> {
-    let refined = |start: Start| {
+    let found = starts(&oriented(problem, &problem.prior.bias), view);
+    let bar = 0.4 * found.first().map_or(0.0, |best| best.score);
+    let mut refined: Vec<(f64, Fit)> = Vec::new();
+    for start in found.iter().take_while(|start| start.score >= bar).take(4) {
+        if refined.iter().any(|(_, fit)| is_near(start, fit)) {
+            continue;
+        }
         let mut fit = Fit {
             surface: start.surface,
             bias: problem.prior.bias,
@@ -67,15 +79,31 @@ fn candidates(problem: &Problem, view: View) -> Vec<(f64, Fit)> {
             weights: vec![0.0; problem.patches.list.len()],
         };
         problem.refine(&mut fit, 4, 8, 0.25);
-        (likelihood(problem, &fit), fit)
+        refined.push((likelihood(problem, &fit), fit));
+    }
+    refined
+}
+
+/// Whether a start value differs from a refined one by less than start values err: it would lead to the same answer.
+fn is_near(start: &Start, fit: &Fit) -> bool {
+    let (a, b) = (&start.surface, &fit.surface);
+    let size = b.size();
+    let near = |x: Option<f64>, y: Option<f64>, reach: f64| match (x, y) {
+        (Some(x), Some(y)) => (x - y).abs() < reach,
+        (x, y) => x.is_none() && y.is_none(),
     };
-    let found = starts(&oriented(problem, &problem.prior.bias), view);
-    let bar = 0.4 * found.first().map_or(0.0, |best| best.score);
-    found.into_iter().take_while(|start| start.score >= bar).take(4).map(refined).collect()
+    let tilt = (a.pose.r_x - b.pose.r_x).hypot(a.pose.r_y - b.pose.r_y);
+    let shift = (a.pose.t_x - b.pose.t_x).hypot(a.pose.t_y - b.pose.t_y);
+    start.inside == fit.inside
+        && tilt < 0.06
+        && shift < 0.15 * size
+        && near(a.radius, b.radius, 0.1 * size)
+        && near(a.cone.map(|c| c.slope), b.cone.map(|c| c.slope), 0.15)
+        && near(a.cone.map(|c| c.apex), b.cone.map(|c| c.apex), 0.3 * size)
 }
 
 /// Refines a candidate on more patches and holds it against the evidence.
-fn settled(problem: &Problem, mut fit: Fit) -> Result<(Fit, WallEvidence), Refusal> {
+fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusal> {
     if fit.surface.cone.is_none() != fit.surface.radius.is_none() && fit.inside {
         fit = with_other_part(problem, fit);
     }
@@ -89,7 +117,8 @@ fn settled(problem: &Problem, mut fit: Fit) -> Result<(Fit, WallEvidence), Refus
     }
     let wall = wall_patches(problem, &fit);
     let evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
-    judge(&evidence, fit.inside, problem.patches.cloud).map(|()| (fit, evidence))
+    judge(&evidence, fit.inside, problem.patches.cloud)?;
+    Ok(Settled { fit, wall, evidence })
 }
 
 /// Whether something else lies well before the cone all around its vertex: then the cone is no surface of feed.
@@ -144,7 +173,7 @@ fn with_other_part(problem: &Problem, fit: Fit) -> Fit {
     let before = likelihood(problem, &fit);
     let Some(surface) = other_part(&fit.surface, &oriented(problem, &fit.bias)) else { return fit };
     let mut both = Fit { surface, misfit: 0.01 * surface.size(), ..fit.clone() };
-    problem.refine(&mut both, 4, 3, 0.2);
+    problem.refine(&mut both, 4, 6, 0.2);
     if likelihood(problem, &both) > before { both } else { fit }
 }
 
@@ -169,8 +198,8 @@ fn oriented(problem: &Problem, bias: &DepthBias) -> Vec<Oriented> {
 fn likelihood(problem: &Problem, fit: &Fit) -> f64 {
     let placed = PlacedSurface::new(fit.surface);
     let gain = |(i, &weight): (usize, &f64)| {
-        let equation = if weight > 0.0 { problem.equation(fit, &placed, i) } else { None };
-        equation.map_or(0.0, |e| weight * (0.5 / (e.variance.sqrt() * e.cosine)).ln().max(0.0))
+        let contact = if weight > 0.0 { problem.contact(fit, &placed, i) } else { None };
+        contact.map_or(0.0, |e| weight * (0.5 / (e.variance.sqrt() * e.cosine)).ln().max(0.0))
     };
     fit.weights.iter().enumerate().map(gain).sum()
 }
@@ -179,7 +208,7 @@ fn likelihood(problem: &Problem, fit: &Fit) -> f64 {
 pub fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
     const ENOUGH: usize = 12;
     let placed = PlacedSurface::new(fit.surface);
-    let seen = (0..wall.len()).filter(|&i| wall[i]).filter_map(|i| problem.equation(fit, &placed, i));
+    let seen = (0..wall.len()).filter(|&i| wall[i]).filter_map(|i| problem.contact(fit, &placed, i));
     let (cylinder, cone) = seen.fold((0, 0), |(cylinder, cone), e| match e.part {
         Part::Cylinder => (cylinder + 1, cone),
         Part::Cone => (cylinder, cone + 1),
@@ -192,10 +221,10 @@ pub fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
 }
 
 /// Patches that agree with the wall and whose neighbours do too: the seam with feed or clutter is left out.
-pub fn wall_patches(problem: &Problem, fit: &Fit) -> Vec<bool> {
+fn wall_patches(problem: &Problem, fit: &Fit) -> Vec<bool> {
     let placed = PlacedSurface::new(fit.surface);
     let agrees: Vec<bool> = (0..problem.patches.list.len())
-        .map(|i| problem.equation(fit, &placed, i).is_some_and(|e| problem.weight(&e, i, 0.15) > 0.2))
+        .map(|i| problem.contact(fit, &placed, i).is_some_and(|c| problem.weight(fit, &placed, &c, i, 0.15) > 0.2))
         .collect();
     if problem.patches.cloud {
         return agrees;

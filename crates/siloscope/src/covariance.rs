@@ -2,7 +2,7 @@
 
 use crate::polish::TileEquation;
 use crate::refine::{Equation, Fit, Problem, System, tukey};
-use crate::surface::{Information, Parameters};
+use crate::surface::{Information, PARAMETERS, Parameters};
 
 /// The model's covariance, widened in those directions in which groups of tiles disagree more than it says.
 ///
@@ -13,15 +13,21 @@ pub fn widened(
     problem: &Problem,
     model: &Information,
     system: &System,
-    equations: &[(usize, Equation)],
+    (tiles, pulls): (&[TileEquation], &[f64]),
 ) -> Information {
-    let blocks = groups(equations, |i, _| block(problem, i));
-    let size = equations.iter().map(|(_, e)| e.z.abs()).fold(0.0, f64::max).max(1e-6);
-    let rings = groups(equations, |_, e| (e.z / size * RINGS).floor() as i64);
-    let sectors =
-        groups(equations, |_, e| (e.across[1].atan2(e.across[0]) / std::f64::consts::TAU * SECTORS).floor() as i64);
-    [blocks, rings, sectors].iter().fold(*model, |covariance, groups| {
-        let spread = groups.iter().fold(system.prior, |sum, g| sum + g * g.transpose());
+    let size = tiles.iter().map(|t| t.equation.z.abs()).fold(0.0, f64::max).max(1e-6);
+    let ring = |t: &TileEquation| ((t.equation.z / size + 1.0) * RINGS).max(0.0) as usize;
+    let sector = |t: &TileEquation| {
+        let [x, y] = t.equation.across;
+        ((y.atan2(x) / std::f64::consts::TAU + 0.5) * SECTORS).max(0.0) as usize
+    };
+    let groups =
+        [groups(tiles, pulls, |t| block(problem, t.patch)), groups(tiles, pulls, ring), groups(tiles, pulls, sector)];
+    groups.iter().fold(*model, |covariance, groups| {
+        let mut spread = System::empty();
+        groups.iter().for_each(|g| spread.add_row(g, 0.0, 1.0));
+        let mut spread = spread.information + system.prior;
+        spread.fill_upper_triangle_with_lower_triangle();
         larger(&covariance, &(model * spread * model * chance(groups.len())))
     })
 }
@@ -33,22 +39,25 @@ const SECTORS: f64 = 48.0;
 /// Side of a block in tiles.
 const BLOCK: u32 = 8;
 
-fn block(problem: &Problem, patch: usize) -> i64 {
+fn block(problem: &Problem, patch: usize) -> usize {
     if problem.patches.cloud {
-        return (patch / 16) as i64;
+        return patch / 16;
     }
     let (column, row) = problem.patches.list[patch].tile;
-    i64::from(row / BLOCK) * 1_000_000 + i64::from(column / BLOCK)
+    (row / BLOCK) as usize * problem.patches.columns + (column / BLOCK) as usize
 }
 
 /// Gradients of the groups.
-fn groups(equations: &[(usize, Equation)], key: impl Fn(usize, &Equation) -> i64) -> Vec<Parameters> {
-    let mut sums: std::collections::BTreeMap<i64, Parameters> = std::collections::BTreeMap::new();
-    for (i, e) in equations {
-        let weight = tukey(e.residual * e.residual / e.variance);
-        *sums.entry(key(*i, e)).or_insert_with(Parameters::zeros) += e.jacobian * (weight * e.residual / e.variance);
+fn groups(tiles: &[TileEquation], pulls: &[f64], group: impl Fn(&TileEquation) -> usize) -> Vec<Parameters> {
+    let mut sums: Vec<Option<Parameters>> = Vec::new();
+    for (tile, pull) in tiles.iter().zip(pulls) {
+        let group = group(tile);
+        if group >= sums.len() {
+            sums.resize(group + 1, None);
+        }
+        *sums[group].get_or_insert_with(Parameters::zeros) += tile.equation.jacobian * *pull;
     }
-    sums.into_values().collect()
+    sums.into_iter().flatten().collect()
 }
 
 /// Undoes what chance alone makes of the largest eigenvalue of a covariance from n samples (Marchenko and Pastur).
@@ -62,18 +71,13 @@ fn chance(samples: usize) -> f64 {
 /// Within a tile the pixels scatter by the sensor's noise and by the wall's relief across it. A grazing ray meets the
 /// relief's crests and not its troughs, so the mean wall is seen shifted inwards. That shift follows the incidence over
 /// the whole frame, and beside that each block of tiles sees its own part of the pattern: neither averages out as noise.
-pub fn relief_uncertainty(
-    problem: &Problem,
-    fit: &Fit,
-    tiles: &[TileEquation],
-    moved: &[(usize, Equation)],
-) -> Information {
+pub fn relief_uncertainty(problem: &Problem, fit: &Fit, tiles: &[TileEquation]) -> Information {
     let relief = relief(tiles);
     if relief == 0.0 {
         return Information::zeros();
     }
     let (mut pull, mut system) = (Parameters::zeros(), System::with_prior(problem.prior, fit));
-    for (_, e) in moved {
+    for TileEquation { equation: e, .. } in tiles {
         let weight = tukey(e.residual * e.residual / e.variance);
         let across = RELIEF_SHARE * relief / e.cosine;
         let blocked = Equation { variance: across * across * f64::from(BLOCK * BLOCK), ..*e };
@@ -91,9 +95,9 @@ const RELIEF_SHARE: f64 = 0.3;
 /// Root-mean-square relief across the wall, metres; 0 where the pixels' scatter needs none beside the noise.
 fn relief(tiles: &[TileEquation]) -> f64 {
     let (mut weights, mut sum) = (0.0, 0.0);
-    for TileEquation { equation: e, scatter, count, .. } in tiles {
+    for TileEquation { equation: e, noise, scatter, count, .. } in tiles {
         let across = e.cosine * e.cosine;
-        let noise = e.variance * count * across;
+        let noise = noise * count * across;
         let weight = count / (2.0 * noise * noise).max(1e-24); // of an estimated variance
         weights += weight;
         sum += weight * (scatter * scatter * across - noise);
@@ -120,16 +124,16 @@ pub fn scale_uncertainty(fit: &Fit, std: f64) -> Information {
 fn larger(a: &Information, b: &Information) -> Information {
     let scale = a.diagonal().map(|v| if v > 0.0 { v.sqrt() } else { 1.0 });
     let scaled = |m: &Information| m.map_with_location(|r, c, v| v / (scale[r] * scale[c]));
-    let eigen = scaled(a).symmetric_eigen();
-    let root = |f: fn(f64) -> f64| {
-        let d = eigen.eigenvalues.map(|v| if v > 1e-13 { f(v) } else { 0.0 });
-        eigen.eigenvectors * Information::from_diagonal(&d) * eigen.eigenvectors.transpose()
-    };
-    let (half, inverse) = (root(f64::sqrt), root(|v| 1.0 / v.sqrt()));
-    let relative = inverse * scaled(b) * inverse;
-    let relative = ((relative + relative.transpose()) * 0.5).symmetric_eigen();
-    let excess = Information::from_diagonal(&relative.eigenvalues.map(|v| v.max(1.0)));
-    let turned = half * relative.eigenvectors;
-    let joined = turned * excess * turned.transpose();
-    joined.map_with_location(|r, c, v| v * scale[r] * scale[c])
+    let mut own = scaled(a);
+    for k in 0..PARAMETERS {
+        own[(k, k)] += if a[(k, k)] > 0.0 { 1e-13 } else { 1.0 }; // what is not estimated stays apart
+    }
+    let Some(root) = own.cholesky().map(|c| c.l()) else { return a + b };
+    let Some(half) = root.solve_lower_triangular(&scaled(b)) else { return a + b };
+    let Some(relative) = root.solve_lower_triangular(&half.transpose()) else { return a + b };
+    let eigen = ((relative + relative.transpose()) * 0.5).symmetric_eigen();
+    let excess = Information::from_diagonal(&eigen.eigenvalues.map(|v| (v - 1.0).max(0.0)));
+    let turned = root * eigen.eigenvectors;
+    let more = turned * excess * turned.transpose();
+    a + more.map_with_location(|r, c, v| v * scale[r] * scale[c])
 }

@@ -3,11 +3,11 @@
 use crate::Result;
 use crate::Vec3;
 use crate::cloud::cloud_patches;
-use crate::coarse::{coarse_fit, drop_bare_parts, wall_patches};
+use crate::coarse::{Settled, coarse_fit, drop_bare_parts};
 use crate::covariance::{relief_uncertainty, scale_uncertainty, widened};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
-use crate::polish::{ALL, TileEquation, moved, patch_equations, pixel_equations, polish, solve_equations};
-use crate::refine::{Equation, Fit, Prior, Problem, tukey};
+use crate::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
+use crate::refine::{Fit, Prior, Problem, tukey};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, DepthError, NoiseLaw};
 use crate::share::FrameShare;
@@ -66,13 +66,12 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     patches.unbias_normals(&know.error.bias);
     clock.lap("patches");
     let (noise, mut prior, pixel) = (noise(&patches, know), prior(know), pixel_size(image));
-    let (mut fit, evidence) = coarse_fit(&mut patches, noise, &prior, pixel)?;
+    let Settled { mut fit, wall, evidence } = coarse_fit(&mut patches, noise, &prior, pixel)?;
     clock.lap("coarse fit");
     if let (Some((radius, _)), true) = (know.radius, prior.bias_std[1] > 0.0) {
         fit.rescale_to(radius);
     }
     let mut problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-    let wall = wall_patches(&problem, &fit);
     drop_bare_parts(&problem, &mut fit, &wall);
     for reach in [3.0, 2.0] {
         problem.noise = polish(&problem, image, &mut fit, &wall, reach, know.error.noise);
@@ -86,10 +85,10 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
         }
     }
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-    let equations = pixel_equations(&problem, image, &fit, &wall, &ALL);
+    let mut equations = pixel_equations(&problem, image, &fit, &wall, &ALL);
     clock.lap("pixels");
     let mut result =
-        finish(&problem, fit, &equations, evidence, know.error.noise.is_some()).ok_or(Refusal::PoorlyDetermined)?;
+        finish(&problem, fit, &mut equations, evidence, know.error.noise.is_some()).ok_or(Refusal::PoorlyDetermined)?;
     clock.lap("covariance");
     result.timing = clock.laps;
     result.patches = patches;
@@ -104,9 +103,10 @@ const MAX_POSITION_STD: f64 = 0.05;
 impl SurfaceFit {
     /// Centres of the patches in the silo frame, freed from the depth bias: what the r–z profile shows.
     pub fn patch_points(&self) -> Vec<Vec3> {
-        let to_silo = |p: &crate::patches::Patch| {
+        let placed = PlacedSurface::new(self.fit.surface);
+        let to_silo = |p: &Patch| {
             let d = if self.patches.cloud { 0.0 } else { self.fit.bias.true_depth(p.measured) };
-            self.fit.surface.pose.to_silo(&p.at(d))
+            placed.to_silo(&p.at(d))
         };
         self.patches.list.iter().map(to_silo).collect()
     }
@@ -138,16 +138,15 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
     let exact = DepthError { bias: DepthBias::default(), bias_std: [0.0; 3], noise: None };
     let prior = prior(&Knowledge { error: exact, ..know.clone() });
     let noise = NoiseLaw::uniform(1e-3); // not used: patches of a cloud carry their own scatter
-    let (mut fit, evidence) = match coarse_fit(&mut patches, noise, &prior, 0.0) {
+    let Settled { mut fit, wall, evidence } = match coarse_fit(&mut patches, noise, &prior, 0.0) {
         Ok(found) => found,
         Err(refusal) => return Ok(Err(refusal)),
     };
     clock.lap("coarse fit");
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
-    let wall = wall_patches(&problem, &fit);
     drop_bare_parts(&problem, &mut fit, &wall);
-    let equations = patch_equations(&problem, &fit, &wall);
-    let Some(mut result) = finish(&problem, fit, &equations, evidence, false) else {
+    let mut equations = patch_equations(&problem, &fit, &wall);
+    let Some(mut result) = finish(&problem, fit, &mut equations, evidence, false) else {
         return Ok(Err(Refusal::PoorlyDetermined));
     };
     clock.lap("covariance");
@@ -190,34 +189,33 @@ fn is_determined(covariance: &Information, placed: &PlacedSurface, height: f64) 
 fn finish(
     problem: &Problem,
     mut fit: Fit,
-    tiles: &[TileEquation],
+    tiles: &mut [TileEquation],
     evidence: WallEvidence,
     noise_is_known: bool,
 ) -> Option<SurfaceFit> {
-    let (system, total) = solve_equations(problem, &mut fit, tiles, 4)?;
-    let equations: Vec<(usize, Equation)> =
-        tiles.iter().map(|t| (t.patch, moved(&t.equation, &total, fit.misfit))).collect();
+    let system = solve_equations(problem, &mut fit, tiles, 4)?;
+    let pulls: Vec<f64> = tiles.iter().map(TileEquation::pull).collect();
     let (model, free) = system.covariance(&fit)?;
-    let mut covariance = widened(problem, &model, &system, &equations);
+    let mut covariance = widened(problem, &model, &system, (tiles, &pulls));
     if noise_is_known {
-        covariance += relief_uncertainty(problem, &fit, tiles, &equations);
+        covariance += relief_uncertainty(problem, &fit, tiles);
     }
-    let heights = equations.iter().map(|(_, e)| e.z).sum::<f64>();
+    let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
-    if !is_determined(&covariance, &placed, heights / equations.len().max(1) as f64) {
+    if !is_determined(&covariance, &placed, heights / tiles.len().max(1) as f64) {
         return None;
     }
-    let share = FrameShare::new((&system, &covariance), (&equations, fit.misfit), &free);
+    let share = FrameShare::new((&system, &covariance), (tiles, &pulls), &free);
     if !free[8] {
         covariance += scale_uncertainty(&fit, problem.prior.bias_std[1]);
     }
     let mut residuals = vec![f64::NAN; problem.patches.list.len()];
     let (mut chi, mut weights) = (0.0, 0.0);
-    for (i, e) in &equations {
+    for TileEquation { patch, equation: e, .. } in tiles.iter() {
         let squared = e.residual * e.residual / e.variance;
         let weight = tukey(squared);
         if weight > 0.0 {
-            residuals[*i] = e.residual * e.cosine;
+            residuals[*patch] = e.residual * e.cosine;
         }
         chi += weight * squared;
         weights += weight;

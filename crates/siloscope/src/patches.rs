@@ -72,6 +72,21 @@ pub struct DepthImage<'a> {
     pub depth: &'a [f32],
 }
 
+impl DepthImage<'_> {
+    /// Depths of up to N pixels from `start` on, 0 beyond `side`.
+    #[inline(always)]
+    pub(crate) fn row<const N: usize>(&self, start: usize, side: usize) -> [f64; N] {
+        let depths = &self.depth[start..start + side];
+        let mut row = [0.0; N];
+        if let Some(whole) = depths.first_chunk::<N>() {
+            row = whole.map(f64::from);
+        } else {
+            row.iter_mut().zip(depths).for_each(|(to, &from)| *to = f64::from(from));
+        }
+        row
+    }
+}
+
 /// Sums of a plane fit z = a + b·u + c·v over pixels, u and v relative to the tile's centre.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sums {
@@ -86,6 +101,9 @@ struct Sums {
     vz: f64,
     zz: f64,
 }
+
+/// Pixels of a row that are added together.
+const LANES: usize = 4;
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Plane {
@@ -107,6 +125,44 @@ impl Sums {
         self.uz += u * z;
         self.vz += v * z;
         self.zz += z * z;
+    }
+
+    /// Adds a row of pixels at v, whose u are counted from `centre`.
+    #[inline]
+    fn add_row(&mut self, v: f64, centre: f64, depths: &[f32]) {
+        let is_there = |z: f32| (z > 0.0) & (z < f32::INFINITY);
+        if !depths.iter().fold(true, |all, &z| all & is_there(z)) {
+            for (u, &z) in depths.iter().enumerate().filter(|(_, z)| is_there(**z)) {
+                self.add(u as f64 - centre, v, f64::from(z));
+            }
+            return;
+        }
+        let (mut z, mut uz, mut zz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (whole, rest) = depths.as_chunks::<LANES>();
+        for (four, depths) in whole.iter().enumerate() {
+            for lane in 0..LANES {
+                let depth = f64::from(depths[lane]);
+                z[lane] += depth;
+                uz[lane] += ((four * LANES + lane) as f64 - centre) * depth;
+                zz[lane] += depth * depth;
+            }
+        }
+        for (lane, &depth) in rest.iter().enumerate() {
+            let depth = f64::from(depth);
+            z[lane] += depth;
+            uz[lane] += ((whole.len() * LANES + lane) as f64 - centre) * depth;
+            zz[lane] += depth * depth;
+        }
+        let n = depths.len() as f64;
+        let of_row: f64 = z.iter().sum();
+        self.n += n;
+        self.uu += n * (n * n - 1.0) / 12.0;
+        self.v += n * v;
+        self.vv += n * v * v;
+        self.z += of_row;
+        self.uz += uz.iter().sum::<f64>();
+        self.vz += v * of_row;
+        self.zz += zz.iter().sum::<f64>();
     }
 
     /// Adds a neighbour's sums, whose centre lies at (du, dv) from ours.
@@ -145,22 +201,26 @@ impl Sums {
 
 /// Side of the tiles: about 80 of them across the image.
 pub fn tile_side(width: usize) -> usize {
-    ((width as f64 / 80.0).round() as usize).clamp(4, 16)
+    ((width as f64 / 80.0).round() as usize).clamp(4, MAX_SIDE)
 }
+
+/// Largest side of a tile, pixels.
+pub const MAX_SIDE: usize = 16;
 
 /// Cuts a depth image into tiles. `noise` is the expected noise where it is known.
 pub fn tile_patches(image: &DepthImage, noise: Option<&NoiseLaw>) -> Patches {
     let side = tile_side(image.width);
     let (columns, rows) = (image.width / side, image.height / side);
     let place = |i: usize| ((i % columns) * side, (i / columns) * side);
-    let mut tiles: Vec<Option<Tile>> = (0..columns * rows).map(|i| tile(image, place(i), side)).collect();
+    let mut tiles = tiles(image, side, (columns, rows));
     let law = noise.copied().unwrap_or_else(|| noise_of(&tiles));
     for (i, tile) in tiles.iter_mut().enumerate() {
         if let Some(rough) = tile.filter(|t| t.scatter > 1.5 * law.sigma(t.depth()) + 3e-4 * t.depth()) {
             *tile = Some(robust_tile(image, place(i), side).unwrap_or(rough));
         }
     }
-    let mut patches = Patches { side, columns, ..Patches::default() };
+    let list = Vec::with_capacity(tiles.iter().flatten().count());
+    let mut patches = Patches { list, side, columns, ..Patches::default() };
     let mut index = vec![NONE; columns * rows];
     for (i, index) in index.iter_mut().enumerate() {
         if let Some(patch) = patch(image, &tiles, (i % columns, i / columns), (columns, rows), side) {
@@ -196,24 +256,30 @@ impl Tile {
     }
 }
 
-fn tile(image: &DepthImage, (u0, v0): (usize, usize), side: usize) -> Option<Tile> {
+/// The tiles of the image, row by row; `None` where too little was measured.
+fn tiles(image: &DepthImage, side: usize, (columns, rows): (usize, usize)) -> Vec<Option<Tile>> {
+    let enough = 0.3 * (side * side) as f64;
     let centre = (side as f64 - 1.0) / 2.0;
-    let mut sums = Sums::default();
-    for v in 0..side {
-        let row = &image.depth[(v0 + v) * image.width + u0..][..side];
-        for (u, &z) in row.iter().enumerate() {
-            if z > 0.0 && z < f32::INFINITY {
-                sums.add(u as f64 - centre, v as f64 - centre, f64::from(z));
+    let mut tiles = Vec::with_capacity(columns * rows);
+    let mut band = vec![Sums::default(); columns];
+    for row in 0..rows {
+        band.fill(Sums::default());
+        for v in 0..side {
+            // along the image's rows, as they lie in memory
+            let depths = &image.depth[(row * side + v) * image.width..][..columns * side];
+            for (sums, depths) in band.iter_mut().zip(depths.chunks_exact(side)) {
+                sums.add_row(v as f64 - centre, centre, depths);
             }
         }
+        tiles.extend(band.iter().map(|sums| if sums.n < enough { None } else { Tile::of(*sums) }));
     }
-    if sums.n < 0.3 * (side * side) as f64 { None } else { Tile::of(sums) }
+    tiles
 }
 
 /// Plane through the tile's majority: a start from the medians of its quadrants, then inliers only.
 fn robust_tile(image: &DepthImage, (u0, v0): (usize, usize), side: usize) -> Option<Tile> {
     let centre = (side as f64 - 1.0) / 2.0;
-    let mut pixels = [(0.0f64, 0.0f64, 0.0f64); 256];
+    let mut pixels = [(0.0f64, 0.0f64, 0.0f64); MAX_SIDE * MAX_SIDE];
     let mut n = 0;
     for v in 0..side {
         for u in 0..side {

@@ -11,8 +11,10 @@ use crate::surface::{Parameters, PlacedSurface};
 pub struct TileEquation {
     /// Index of the patch.
     pub patch: usize,
-    /// Its equation; the variance is that of the noise alone.
+    /// Its equation.
     pub equation: Equation,
+    /// Variance of the residual by the noise alone.
+    pub noise: f64,
     /// Scatter of the pixels about the tile's mean, metres along the ray.
     pub scatter: f64,
     /// Number of its pixels.
@@ -28,12 +30,12 @@ pub fn polish(
     reach: f64,
     known: Option<NoiseLaw>,
 ) -> NoiseLaw {
-    let equations = pixel_equations(problem, image, fit, wall, &Thinning { reach, ..SKETCH });
+    let mut equations = pixel_equations(problem, image, fit, wall, &Thinning { reach, ..SKETCH });
     let noise = known.unwrap_or_else(|| {
         let sample = |e: &TileEquation| (problem.patches.list[e.patch].measured, e.scatter);
         noise_from_scatter(&mut equations.iter().map(sample).collect::<Vec<_>>(), 1e-5)
     });
-    solve_equations(problem, fit, &equations, 2);
+    solve_equations(problem, fit, &mut equations, 2);
     noise
 }
 
@@ -42,7 +44,7 @@ pub fn polish(
 pub struct Thinning {
     /// Every so many tiles.
     pub tiles: usize,
-    /// Every so many pixels along a tile's rows and columns.
+    /// Every so many rows of a tile.
     pub stride: usize,
     /// Pixels further off than the noise and so many misfits allow don't count.
     pub reach: f64,
@@ -52,7 +54,7 @@ pub struct Thinning {
 pub const ALL: Thinning = Thinning { tiles: 1, stride: 1, reach: 1.0 };
 
 /// One pixel in twelve: the steps towards it.
-const SKETCH: Thinning = Thinning { tiles: 3, stride: 2, reach: 3.0 };
+const SKETCH: Thinning = Thinning { tiles: 3, stride: 4, reach: 3.0 };
 
 /// Equations of the wall's tiles from their pixels.
 pub fn pixel_equations(
@@ -71,12 +73,15 @@ pub fn pixel_equations(
         let misfit = fit.misfit / equation.cosine;
         let single = (equation.variance - misfit * misfit).max(0.0) * count;
         let sampling = Sampling { stride, reach: 4.0 * (single.sqrt() + reach * misfit) };
-        let seen = tile_residual(image, problem.patches, patch, &placed, &fit.bias, sampling);
-        let enough = seen.count * ((stride * stride) as f64) >= 0.5 * count;
-        let equation = Equation { residual: seen.mean, variance: single / seen.count, ..equation };
-        enough.then_some(TileEquation { patch, equation, scatter: seen.scatter, count: seen.count })
+        let seen = tile_residual(image, problem.patches, (patch, equation.part), &placed, &fit.bias, sampling);
+        let enough = seen.count * stride as f64 >= 0.5 * count;
+        let noise = single / seen.count;
+        let equation = Equation { residual: seen.mean, variance: noise, ..equation };
+        enough.then_some(TileEquation { patch, equation, noise, scatter: seen.scatter, count: seen.count })
     };
-    (0..wall.len()).filter(|&i| wall[i]).step_by(tiles).filter_map(tile).collect()
+    let mut equations = Vec::with_capacity(wall.len() / tiles);
+    equations.extend((0..wall.len()).filter(|&i| wall[i]).step_by(tiles).filter_map(tile));
+    equations
 }
 
 /// Equations of a cloud's wall patches from their own means.
@@ -89,13 +94,17 @@ pub fn patch_equations(problem: &Problem, fit: &Fit, wall: &[bool]) -> Vec<TileE
         Some(TileEquation {
             patch,
             equation: Equation { variance: noise, ..equation },
+            noise,
             scatter: seen.scatter,
             count: seen.count,
         })
     };
     let mut equations: Vec<TileEquation> = (0..wall.len()).filter(|&i| wall[i]).filter_map(patch).collect();
     let factor = noise_factor(&equations);
-    equations.iter_mut().for_each(|e| e.equation.variance *= factor);
+    for e in &mut equations {
+        e.noise *= factor;
+        e.equation.variance = e.noise;
+    }
     equations
 }
 
@@ -112,54 +121,67 @@ fn noise_factor(equations: &[TileEquation]) -> f64 {
     (median / MEDIAN_OF_CHI_SQUARE).clamp(1e-3, 1.0)
 }
 
+/// A step this small is the last, in squared standard deviations.
+const SETTLED: f64 = 1e-4;
+
 /// Robust solution of linear equations: reweighted a few times, the misfit re-estimated on the way.
+///
+/// Leaves the equations as they are after the step, with the misfit in their variance.
 pub fn solve_equations(
     problem: &Problem,
     fit: &mut Fit,
-    equations: &[TileEquation],
+    equations: &mut [TileEquation],
     rounds: usize,
-) -> Option<(System, Parameters)> {
+) -> Option<System> {
     let mut total = Parameters::zeros();
-    let mut misfit = fit.misfit;
     let mut system = System::with_prior(problem.prior, fit);
+    equations.iter_mut().for_each(|e| e.allow(fit.misfit));
     for _ in 0..rounds {
         system = System::with_prior(problem.prior, fit);
-        for tile in equations {
-            let moved = moved(&tile.equation, &total, misfit);
-            system.add(&moved, tukey(moved.residual * moved.residual / moved.variance));
+        for TileEquation { equation: e, .. } in equations.iter() {
+            system.add(e, tukey(e.residual * e.residual / e.variance));
         }
         // the residuals are already moved by `total`, the prior is not
         system.gradient += system.prior * total;
         let step = system.solve(fit)?;
         total += step;
-        misfit = misfit_of(equations, &total);
+        equations.iter_mut().for_each(|e| e.equation.residual += e.equation.jacobian.dot(&step));
+        let before = fit.misfit;
+        fit.misfit = misfit_of(equations);
+        equations.iter_mut().for_each(|e| e.allow(fit.misfit));
+        if -system.gradient.dot(&step) < SETTLED && (fit.misfit / before - 1.0).abs() < SETTLED.sqrt() {
+            break;
+        }
     }
     fit.surface = fit.surface.stepped(&total);
     fit.bias.offset += total[7];
     fit.bias.scale += total[8];
     fit.bias.quadratic += total[9];
-    fit.misfit = misfit;
-    Some((system, total))
+    Some(system)
 }
 
-/// The equation after a step, with the wall's misfit in its variance.
-pub fn moved(equation: &Equation, step: &Parameters, misfit: f64) -> Equation {
-    let across = misfit / equation.cosine;
-    Equation {
-        residual: equation.residual + equation.jacobian.dot(step),
-        variance: equation.variance + across * across,
-        ..*equation
+impl TileEquation {
+    /// How much the tile pulls at the answer: its weighted residual in units of its variance.
+    pub fn pull(&self) -> f64 {
+        let Equation { residual, variance, .. } = self.equation;
+        tukey(residual * residual / variance) * residual / variance
+    }
+
+    /// Puts a misfit of the wall into the variance.
+    fn allow(&mut self, misfit: f64) {
+        let along = misfit / self.equation.cosine;
+        self.equation.variance = self.noise + along * along;
     }
 }
 
 /// Misfit across the wall that the tiles' residuals need beside their noise.
-fn misfit_of(equations: &[TileEquation], step: &Parameters) -> f64 {
+fn misfit_of(equations: &[TileEquation]) -> f64 {
     let mut excess: Vec<f64> = Vec::with_capacity(equations.len());
     let mut noise: Vec<f64> = Vec::with_capacity(equations.len());
-    for TileEquation { equation: e, .. } in equations {
-        let across = (e.residual + e.jacobian.dot(step)) * e.cosine;
-        excess.push(across.abs());
-        noise.push(e.variance * e.cosine * e.cosine);
+    for tile in equations {
+        let cosine = tile.equation.cosine;
+        excess.push((tile.equation.residual * cosine).abs());
+        noise.push(tile.noise * cosine * cosine);
     }
     if excess.is_empty() {
         return 0.0;

@@ -8,7 +8,7 @@
 use crate::Vec3;
 use crate::patches::Patches;
 use crate::sensor::{DepthBias, NoiseLaw};
-use crate::surface::{Information, PARAMETERS, Parameters, Part, PlacedSurface, SiloSurface};
+use crate::surface::{Information, Local, PARAMETERS, Parameters, Part, PlacedSurface, SiloSurface};
 
 /// What is known before the frame is looked at.
 #[derive(Debug, Clone)]
@@ -51,8 +51,6 @@ pub struct Equation {
     pub variance: f64,
     /// Cosine between the ray and the wall's normal: residual × cosine is the distance from the wall.
     pub cosine: f64,
-    /// Squared angle between the patch's normal and the wall's.
-    pub angle2: f64,
     /// Part of the wall.
     pub part: Part,
     /// Height in the silo frame.
@@ -79,11 +77,70 @@ const MISFIT_FLOOR: f64 = 2e-4;
 /// Residuals beyond this many standard deviations have no weight (Tukey's constant).
 const TUKEY: f64 = 4.7;
 
+/// A patch held against the wall: what its weight asks for, and what its equation is made of.
+#[derive(Debug, Clone, Copy)]
+pub struct Contact {
+    /// Residual along the ray, metres.
+    pub residual: f64,
+    /// Variance of the residual: noise of the mean and misfit.
+    pub variance: f64,
+    /// Cosine between the ray and the wall's normal: residual × cosine is the distance from the wall.
+    pub cosine: f64,
+    /// Part of the wall.
+    pub part: Part,
+    /// Depth of the wall where the derivative is taken, and the point there, camera frame.
+    d: f64,
+    p: Vec3,
+    at: Local,
+    /// Length of the gradient, and change of the residual per change of the implicit function.
+    length: f64,
+    rate: f64,
+}
+
 impl Problem<'_> {
+    /// Patch `i` against the wall; `None` where its ray runs along the wall or it straddles the joint.
+    #[inline(always)]
+    pub fn contact(&self, fit: &Fit, placed: &PlacedSurface, i: usize) -> Option<Contact> {
+        let measured = self.patches.list[i].measured;
+        self.contact_at(fit, placed, i, if self.patches.cloud { 0.0 } else { fit.bias.true_depth(measured) })
+    }
+
+    #[inline(always)]
+    fn contact_at(&self, fit: &Fit, placed: &PlacedSurface, i: usize, d: f64) -> Option<Contact> {
+        let patch = &self.patches.list[i];
+        let cloud = self.patches.cloud;
+        let turned = placed.turn(&patch.q);
+        let at = if cloud { placed.local(&patch.origin) } else { placed.local_along(&turned, d) };
+        let length = at.gradient.norm();
+        let q = if cloud { at.gradient / length } else { turned };
+        let along = at.gradient.dot(&q);
+        let (full, inverse) = (length * q.norm(), 1.0 / along);
+        let cosine = along / full;
+        let half = 0.5 * self.pixel * self.patches.side as f64 * d; // of the tile, before it is stretched by 1/cosine
+        if cosine.is_nan() || cosine.abs() < 0.02 || (at.p.z - placed.bottom()).abs() * cosine.abs() < half {
+            return None;
+        }
+        let rate = (if cloud { 1.0 } else { fit.bias.slope(d) }) * inverse;
+        let sigma = if cloud { patch.scatter } else { self.noise.sigma(d) };
+        let misfit = fit.misfit * full * inverse;
+        let variance = sigma * sigma / patch.count + misfit * misfit;
+        let cosine = cosine.abs();
+        Some(Contact {
+            residual: rate * at.value,
+            variance,
+            cosine,
+            part: at.part,
+            d,
+            p: patch.at(d),
+            at,
+            length,
+            rate,
+        })
+    }
+
     /// The equation of patch `i`; `None` where its ray runs along the wall or it straddles the joint.
     pub fn equation(&self, fit: &Fit, placed: &PlacedSurface, i: usize) -> Option<Equation> {
-        let measured = self.patches.list[i].measured;
-        self.equation_at(fit, placed, i, if self.patches.cloud { 0.0 } else { fit.bias.true_depth(measured) })
+        self.contact(fit, placed, i).map(|contact| self.equation_of(placed, &contact))
     }
 
     /// The equation of patch `i` with its residual left at the distance of the depth `d` from the wall.
@@ -91,50 +148,38 @@ impl Problem<'_> {
     /// With d on the wall, neither the derivative nor the variance depends on the noise of the patch itself. That
     /// matters: a derivative that carries the residual's own noise pulls the answer along weakly determined directions.
     pub fn equation_at(&self, fit: &Fit, placed: &PlacedSurface, i: usize, d: f64) -> Option<Equation> {
-        let patch = &self.patches.list[i];
-        let cloud = self.patches.cloud;
-        let p = patch.at(d);
-        let at = placed.local(&p);
-        let length = at.gradient.norm();
-        let q = if cloud { at.gradient / length } else { placed.turn(&patch.q) };
-        let along = at.gradient.dot(&q);
-        let cosine = along / (length * q.norm());
-        let size = self.pixel * self.patches.side as f64 * d / cosine.abs();
-        if cosine.is_nan() || cosine.abs() < 0.02 || (at.p.z - placed.bottom()).abs() < 0.5 * size {
-            return None;
-        }
-        let slope = if cloud { 1.0 } else { fit.bias.slope(d) };
-        let mut jacobian = placed.derivative(&p, &at) * (slope / along);
-        if !cloud {
+        self.contact_at(fit, placed, i, d).map(|contact| self.equation_of(placed, &contact))
+    }
+
+    #[inline]
+    fn equation_of(&self, placed: &PlacedSurface, contact: &Contact) -> Equation {
+        let Contact { residual, variance, cosine, part, d, p, at, rate, .. } = *contact;
+        let mut jacobian = placed.derivative(&p, &at) * rate;
+        if !self.patches.cloud {
             jacobian[7] = -1.0;
             jacobian[8] = -d;
             jacobian[9] = -d * d;
         }
-        let sigma = if cloud { patch.scatter } else { self.noise.sigma(d) };
-        let misfit = fit.misfit / cosine;
-        let facing = placed.turn(&patch.normal).dot(&at.gradient) / length;
-        let agreement = if cloud { facing.abs() } else { facing * if fit.inside { -1.0 } else { 1.0 } };
-        Some(Equation {
-            residual: slope * at.value / along,
-            jacobian,
-            variance: sigma * sigma / patch.count + misfit * misfit,
-            cosine: cosine.abs(),
-            angle2: 2.0 * (1.0 - agreement),
-            part: at.part,
-            z: at.p.z,
-            across: [at.p.x, at.p.y],
-        })
+        Equation { residual, jacobian, variance, cosine, part, z: at.p.z, across: [at.p.x, at.p.y] }
     }
 
-    /// Robust weight of an equation: by residual and by normal.
-    pub fn weight(&self, equation: &Equation, i: usize, angle: f64) -> f64 {
+    /// Robust weight of patch `i`: by residual and by normal, which may be `angle` off beside its own uncertainty.
+    #[inline]
+    pub fn weight(&self, fit: &Fit, placed: &PlacedSurface, contact: &Contact, i: usize, angle: f64) -> f64 {
         let patch = &self.patches.list[i];
-        let limit = angle + 3.0 * patch.sigma_normal;
-        let by_normal = 1.0 - equation.angle2 / (limit * limit);
-        if by_normal <= 0.0 || !patch.smooth {
+        let by_residual = tukey(contact.residual * contact.residual / contact.variance);
+        if by_residual <= 0.0 || !patch.smooth {
             return 0.0;
         }
-        tukey(equation.residual * equation.residual / equation.variance) * by_normal.min(0.5) * 2.0
+        let facing = placed.turn(&patch.normal).dot(&contact.at.gradient) / contact.length;
+        let agreement = match (self.patches.cloud, fit.inside) {
+            (true, _) => facing.abs(),
+            (false, true) => -facing,
+            (false, false) => facing,
+        };
+        let limit = angle + 3.0 * patch.sigma_normal;
+        let by_normal = 1.0 - 2.0 * (1.0 - agreement) / (limit * limit); // the squared angle is 2·(1 − cosine)
+        by_residual * by_normal.clamp(0.0, 0.5) * 2.0
     }
 
     /// Runs `rounds` Gauss–Newton steps over every `stride`-th patch; `angle` is the tolerated angle between normals.
@@ -151,17 +196,17 @@ impl Problem<'_> {
         let (mut cylinder, mut cone, mut noise) = (0.0, 0.0, 0.0);
         fit.weights.iter_mut().for_each(|w| *w = 0.0);
         for i in (0..self.patches.list.len()).step_by(stride) {
-            let Some(equation) = self.equation(fit, &placed, i) else { continue };
-            let weight = self.weight(&equation, i, angle);
+            let Some(contact) = self.contact(fit, &placed, i) else { continue };
+            let weight = self.weight(fit, &placed, &contact, i, angle);
             if weight <= 0.0 {
                 continue;
             }
             fit.weights[i] = weight;
-            system.add(&equation, weight);
-            across.push((equation.residual * equation.cosine).abs());
-            let misfit = fit.misfit / equation.cosine;
-            noise += (equation.variance - misfit * misfit).max(0.0) * equation.cosine * equation.cosine;
-            *(if equation.part == Part::Cylinder { &mut cylinder } else { &mut cone }) += weight;
+            system.add(&self.equation_of(&placed, &contact), weight);
+            let Contact { residual, variance, cosine, part, .. } = contact;
+            across.push((residual * cosine).abs());
+            noise += (variance * cosine * cosine - fit.misfit * fit.misfit).max(0.0);
+            *(if part == Part::Cylinder { &mut cylinder } else { &mut cone }) += weight;
         }
         let noise = noise / (across.len().max(1)) as f64;
         if let Some(step) = system.solve(fit) {
@@ -234,7 +279,7 @@ impl Fit {
 /// Normal equations H·step = −g.
 #[derive(Debug, Clone)]
 pub struct System {
-    /// Information H from the frame and the prior.
+    /// Information H from the frame and the prior; only the lower triangle is kept.
     pub information: Information,
     /// Gradient g.
     pub gradient: Parameters,
@@ -243,10 +288,14 @@ pub struct System {
 }
 
 impl System {
+    /// No information.
+    pub fn empty() -> Self {
+        Self { information: Information::zeros(), gradient: Parameters::zeros(), prior: Information::zeros() }
+    }
+
     /// The prior alone, seen from the fit's present state.
     pub fn with_prior(prior: &Prior, fit: &Fit) -> Self {
-        let mut system =
-            Self { information: Information::zeros(), gradient: Parameters::zeros(), prior: Information::zeros() };
+        let mut system = Self::empty();
         let now = [fit.bias.offset, fit.bias.scale, fit.bias.quadratic];
         let expected = [prior.bias.offset, prior.bias.scale, prior.bias.quadratic];
         for k in 0..3 {
@@ -280,16 +329,21 @@ impl System {
     /// Adds an equation with a robust weight.
     #[inline]
     pub fn add(&mut self, equation: &Equation, weight: f64) {
-        let scale = weight / equation.variance;
-        let j: &[f64; PARAMETERS] = &equation.jacobian.data.0[0];
+        self.add_row(&equation.jacobian, equation.residual, weight / equation.variance);
+    }
+
+    /// Adds a residual with its derivative and its information.
+    #[inline]
+    pub fn add_row(&mut self, jacobian: &Parameters, residual: f64, information: f64) {
+        let j: &[f64; PARAMETERS] = &jacobian.data.0[0];
         let h: &mut [[f64; PARAMETERS]; PARAMETERS] = &mut self.information.data.0;
-        for (column, &of_column) in h.iter_mut().zip(j) {
-            let factor = scale * of_column;
-            for (entry, &of_row) in column.iter_mut().zip(j) {
+        for k in 0..PARAMETERS {
+            let factor = information * j[k];
+            for (entry, &of_row) in h[k][k..].iter_mut().zip(&j[k..]) {
                 *entry += factor * of_row;
             }
         }
-        self.gradient += equation.jacobian * (scale * equation.residual);
+        self.gradient += jacobian * (information * residual);
     }
 
     /// H with unit information on the parameters that are not free, scaled to a unit diagonal; the scale; who is free.

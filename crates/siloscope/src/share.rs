@@ -4,7 +4,8 @@
 //! uncertain their sum is depends on how much of g's scatter is new in every frame (the sensor's noise) and how much
 //! comes back (dents, corrugation, a warped lens).
 
-use crate::refine::{Equation, System, tukey};
+use crate::polish::TileEquation;
+use crate::refine::{System, tukey};
 use crate::surface::{Information, PARAMETERS, Parameters};
 
 /// What one frame alone says.
@@ -23,22 +24,22 @@ pub struct FrameShare {
 }
 
 impl FrameShare {
-    /// From the last equations, the system they make, and the covariance of the free parameters.
+    /// From the last equations and how they pull, the system they make, and the covariance of the free parameters.
     pub fn new(
         (system, covariance): (&System, &Information),
-        (equations, misfit): (&[(usize, Equation)], f64),
+        (tiles, pulls): (&[TileEquation], &[f64]),
         free: &[bool; PARAMETERS],
     ) -> Self {
         let mut information = system.information - system.prior;
-        information.fill_lower_triangle_with_upper_triangle();
-        let (mut gradient, mut noise) = (Parameters::zeros(), Information::zeros());
-        for (_, e) in equations {
+        information.fill_upper_triangle_with_lower_triangle();
+        let (mut gradient, mut sensor) = (Parameters::zeros(), System::empty());
+        for (TileEquation { equation: e, noise, .. }, pull) in tiles.iter().zip(pulls) {
+            gradient += e.jacobian * *pull;
             let weight = tukey(e.residual * e.residual / e.variance);
-            let across = misfit / e.cosine;
-            gradient += e.jacobian * (weight * e.residual / e.variance);
-            let sensor = (1.0 - across * across / e.variance).max(0.0);
-            noise += e.jacobian * e.jacobian.transpose() * (weight * sensor / e.variance);
+            sensor.add_row(&e.jacobian, 0.0, weight * noise / (e.variance * e.variance));
         }
+        let mut noise = sensor.information;
+        noise.fill_upper_triangle_with_lower_triangle();
         let joint = among(&(information + system.prior), free);
         let scatter = joint * covariance * joint - among(&system.prior, free);
         Self { information, gradient, scatter, noise, prior: system.prior.diagonal() }

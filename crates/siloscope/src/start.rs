@@ -79,7 +79,10 @@ impl Random {
     }
 }
 
-const TRIALS: usize = 1500;
+/// Most and fewest trials.
+const TRIALS: (usize, usize) = (1500, 250);
+/// How often three patches should have been drawn that all agree with the best hypothesis.
+const HITS: f64 = 40.0;
 const SCORED: usize = 300;
 const KEPT: usize = 6;
 /// Tolerated distance from a hypothesis, as a share of its radius.
@@ -111,7 +114,10 @@ pub fn starts(patches: &[Oriented], view: View) -> Vec<Start> {
     }
     let sample = thinned(patches, SCORED);
     let mut kept: Vec<Hypothesis> = Vec::new();
-    for trial in 0..TRIALS {
+    for trial in 0..TRIALS.0 {
+        if trial >= enough(&kept, sample.len()) {
+            break;
+        }
         let mut pick = || &patches[random.below(patches.len())];
         let found = if trial % 5 < 2 || view == View::Outside {
             cylinder(pick(), pick(), view)
@@ -119,7 +125,7 @@ pub fn starts(patches: &[Oriented], view: View) -> Vec<Start> {
             cone(pick(), pick(), pick())
         };
         let Some(mut hypothesis) = found else { continue };
-        let bar = kept.iter().map(|h| h.score).fold(0.0, f64::max);
+        let bar = kept.first().map_or(0.0, |best| best.score);
         hypothesis.score = score(&hypothesis, &sample, 0.3 * bar);
         if hypothesis.score > 0.3 * bar && hypothesis.score > 0.0 {
             keep(&mut kept, hypothesis);
@@ -128,6 +134,12 @@ pub fn starts(patches: &[Oriented], view: View) -> Vec<Start> {
     let mut starts: Vec<Start> = kept.iter().flat_map(|h| complete(h, &sample)).collect();
     starts.sort_by(|a, b| b.score.total_cmp(&a.score));
     starts
+}
+
+/// Number of trials after which the hypotheses have been found as often as it takes to tell which one is best.
+fn enough(kept: &[Hypothesis], sample: usize) -> usize {
+    let share = kept.first().map_or(0.0, |best| best.score) / sample as f64;
+    ((HITS / share.powi(3)) as usize).clamp(TRIALS.1, TRIALS.0)
 }
 
 fn thinned(patches: &[Oriented], n: usize) -> Vec<Oriented> {
@@ -346,11 +358,24 @@ fn best(proposals: impl Iterator<Item = SiloSurface>, bar: f64, reach: f64, loca
     let mut found = None;
     let mut best = bar + 3.0;
     for &surface in proposals.iter().step_by(proposals.len().div_ceil(TRIED).max(1)) {
-        let score = profile_score(&surface, true, reach, local);
-        if score > best {
+        if let Some(score) = score_above(best, &surface, reach, local) {
             best = score;
             found = Some(surface);
         }
     }
     found
+}
+
+/// The score of a surface seen from inside, where it beats `bar`; ends as soon as it no longer can.
+fn score_above(bar: f64, s: &SiloSurface, reach: f64, local: &[Oriented]) -> Option<f64> {
+    const RUN: usize = 32;
+    let (mut total, mut left) = (0.0, local.len());
+    for run in local.chunks(RUN) {
+        total += run.iter().map(|o| profile_agreement(s, true, reach, o)).sum::<f64>();
+        left -= run.len();
+        if total + left as f64 <= bar {
+            return None;
+        }
+    }
+    Some(total)
 }

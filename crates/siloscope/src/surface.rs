@@ -159,15 +159,27 @@ impl PlacedSurface {
     /// The implicit function at a point of the camera frame, of the part that is there at its height.
     #[inline]
     pub fn local(&self, p_camera: &Vec3) -> Local {
-        let p = self.to_silo(p_camera);
+        self.local_in_silo(self.to_silo(p_camera))
+    }
+
+    /// The same at depth `d` on a ray whose direction is already turned into the silo frame.
+    #[inline(always)]
+    pub fn local_along(&self, turned: &Vec3, d: f64) -> Local {
+        let SiloPose { t_x, t_y, .. } = self.surface.pose;
+        self.local_in_silo(Vec3::new(turned.x * d + t_x, turned.y * d + t_y, turned.z * d))
+    }
+
+    #[inline(always)]
+    fn local_in_silo(&self, p: Vec3) -> Local {
         self.local_of(p, if p.z < self.bottom { Part::Cylinder } else { Part::Cone })
     }
 
     /// The implicit function of a given part at a point of the silo frame; the other part where that one is missing.
-    #[inline]
+    #[inline(always)]
     pub fn local_of(&self, p: Vec3, part: Part) -> Local {
         let rho = (p.x * p.x + p.y * p.y).sqrt().max(1e-12); // lengths here are far from overflow: no hypot needed
-        let [x, y] = [p.x / rho, p.y / rho];
+        let inverse = 1.0 / rho;
+        let [x, y] = [p.x * inverse, p.y * inverse];
         let (part, radius, rise) = match (part, self.surface.radius, self.surface.cone) {
             (Part::Cone, _, Some(cone)) | (Part::Cylinder, None, Some(cone)) => {
                 (Part::Cone, cone.slope * (cone.apex - p.z), cone.slope)
@@ -177,7 +189,7 @@ impl PlacedSurface {
         let [c, s] = self.surface.ovality;
         let (cos, sin) = (x * x - y * y, 2.0 * x * y);
         let oval = 1.0 + c * cos + s * sin;
-        let around = -radius / rho * 2.0 * (s * cos - c * sin); // ∂F/∂φ, divided by ρ
+        let around = -2.0 * radius * inverse * (s * cos - c * sin); // ∂F/∂φ, divided by ρ
         Local {
             part,
             p,
@@ -189,7 +201,7 @@ impl PlacedSurface {
     }
 
     /// Derivative of F at a point (camera frame and its `Local`) with respect to the parameters.
-    #[inline]
+    #[inline(always)]
     pub fn derivative(&self, p_camera: &Vec3, at: &Local) -> Parameters {
         let g = &at.gradient;
         let mut d = Parameters::zeros();
@@ -228,8 +240,7 @@ impl PlacedSurface {
     pub fn depth(&self, q: &Vec3) -> (f64, Part) {
         let ray = [q.x, q.y];
         let cylinder = self.rounded(ray, self.cylinder_depth(ray), Part::Cylinder);
-        let down = self.rotation[(2, 0)] * q.x + self.rotation[(2, 1)] * q.y + self.rotation[(2, 2)];
-        if self.surface.cone.is_none() || cylinder * down < self.bottom {
+        if self.surface.cone.is_none() || cylinder * self.down(ray) < self.bottom {
             (cylinder, Part::Cylinder)
         } else {
             (self.rounded(ray, self.cone_depth(ray), Part::Cone), Part::Cone)
@@ -269,6 +280,12 @@ impl PlacedSurface {
         let a = q[0] * q[0] + q[1] * q[1] - self.cone_m2 * q[2] * q[2];
         let b = t_x * q[0] + t_y * q[1] + self.cone_b * q[2];
         -self.cone_c / (b + (b * b - a * self.cone_c).sqrt())
+    }
+
+    /// Height in the silo frame gained per metre of depth along the ray `(x, y, 1)` of the camera frame.
+    #[inline]
+    pub fn down(&self, [x, y]: [f64; 2]) -> f64 {
+        self.rotation[(2, 0)] * x + self.rotation[(2, 1)] * y + self.rotation[(2, 2)]
     }
 
     #[inline]

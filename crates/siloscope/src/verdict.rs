@@ -65,6 +65,8 @@ struct Seat {
     rho: f64,
     normal_azimuth: f64,
     normal_polar: f64,
+    /// Length of the normal across the axis.
+    normal_radial: f64,
     part: Part,
     sigma: f64,
 }
@@ -85,8 +87,8 @@ pub fn wall_evidence(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall:
             }
             let weight = 1.0 / (from.sigma * from.sigma + to.sigma * to.sigma + 1e-6);
             let around = wrapped(to.azimuth - from.azimuth);
-            let radial = (1.0 - from.normal_polar.sin().powi(2)).sqrt();
-            turn.add(around * radial, wrapped(to.normal_azimuth - from.normal_azimuth) * radial, weight);
+            let turned = wrapped(to.normal_azimuth - from.normal_azimuth);
+            turn.add(around * from.normal_radial, turned * from.normal_radial, weight);
             let along = (to.along - from.along) / (0.5 * (from.rho + to.rho));
             if along.abs() > 0.5 * around.abs() {
                 bend.add(along, to.normal_polar - from.normal_polar, weight);
@@ -103,13 +105,18 @@ pub fn wall_evidence(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall:
         bend,
         bend_std,
         arc: arc(seats.iter().flatten().map(|s| s.azimuth)),
-        behind: behind(patches, fit, placed),
+        behind: behind(patches, fit, placed, wall),
     }
 }
 
-fn wrapped(angle: f64) -> f64 {
+/// The difference of two azimuths within ±π, without a turn too many.
+fn wrapped(difference: f64) -> f64 {
     use std::f64::consts::{PI, TAU};
-    (angle + PI).rem_euclid(TAU) - PI
+    match difference {
+        d if d > PI => d - TAU,
+        d if d < -PI => d + TAU,
+        d => d,
+    }
 }
 
 fn seat(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall: &[bool], i: usize) -> Option<Seat> {
@@ -121,7 +128,7 @@ fn seat(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall: &[bool], i: 
     let at = placed.local(&p);
     let n = placed.turn(&patch.normal);
     let n = if n.dot(&at.gradient) < 0.0 { -n } else { n };
-    let rho = at.p.x.hypot(at.p.y);
+    let rho = at.p.xy().norm();
     let stretch = at.gradient.norm();
     Some(Seat {
         azimuth: at.p.y.atan2(at.p.x),
@@ -129,6 +136,7 @@ fn seat(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall: &[bool], i: 
         rho,
         normal_azimuth: n.y.atan2(n.x),
         normal_polar: n.z.clamp(-1.0, 1.0).asin(),
+        normal_radial: n.xy().norm(),
         part: at.part,
         sigma: patch.sigma_normal,
     })
@@ -160,17 +168,17 @@ fn arc(azimuths: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Share of patches that lie clearly behind the wall as seen from the camera.
-fn behind(patches: &Patches, fit: &Fit, placed: &PlacedSurface) -> f64 {
+fn behind(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall: &[bool]) -> f64 {
     let list = &patches.list;
     let reach = |p: f64| 0.05 * p;
     let outside = |i: &usize| {
         let patch = &list[*i];
         let p = patch.at(if patches.cloud { 0.0 } else { fit.bias.true_depth(patch.measured) });
         let at = placed.local(&p);
-        at.value / at.gradient.norm() > reach(at.p.x.hypot(at.p.y)) + 5.0 * fit.misfit
+        at.value / at.gradient.norm() > reach(at.p.xy().norm()) + 5.0 * fit.misfit
     };
     if !fit.inside || patches.cloud {
         return 0.0;
     }
-    (0..list.len()).filter(outside).count() as f64 / list.len().max(1) as f64
+    (0..list.len()).filter(|&i| !wall[i]).filter(outside).count() as f64 / list.len().max(1) as f64
 }
