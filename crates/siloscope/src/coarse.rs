@@ -173,7 +173,7 @@ fn with_other_part(problem: &Problem, fit: Fit) -> Fit {
     let before = likelihood(problem, &fit);
     let Some(surface) = other_part(&fit.surface, &oriented(problem, &fit.bias)) else { return fit };
     let mut both = Fit { surface, misfit: 0.01 * surface.size(), ..fit.clone() };
-    problem.refine(&mut both, 4, 6, 0.2);
+    problem.refine(&mut both, 4, 3, 0.2);
     if likelihood(problem, &both) > before { both } else { fit }
 }
 
