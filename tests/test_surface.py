@@ -10,7 +10,7 @@ import pytest
 from siloscope import Estimate, SiloPose, sensors
 from siloscope.paper import metrics
 from siloscope.paper.scenarios import scenario
-from siloscope.scene import ASTRA_S, Scene
+from siloscope.scene import ASTRA_S, Feed, Scene
 from siloscope.surface import fit_depth, reasons
 
 NAMES = ("silo1", "silo2", "silo3")
@@ -49,6 +49,15 @@ def test_perturbed_frames_with_a_known_profile_are_within_the_noise(name: str) -
     assert pose is not None
     error = np.array([pose.r_x - truth.r_x, pose.r_y - truth.r_y, pose.t_x - truth.t_x, pose.t_y - truth.t_y])
     assert error @ np.linalg.solve(estimate.covariance, error) < 18.5  # 99.9 % of a chi-square with 4 degrees
+
+
+def test_a_funnel_of_feed_about_the_axis_is_not_taken_for_the_cone() -> None:
+    scene = replace(scenario("silo3"), feed=Feed("funnel", 0.45), sensor=ASTRA_S, seed=1)
+    estimate = fit(scene, "orbbec-astra-s")
+    assert gap(estimate, scene) < 2.0
+    truth = scene.silo.geometry
+    assert estimate.silo.apex == pytest.approx(truth.apex, abs=0.01)  # feed lies at 65°, this cone at 30°
+    assert estimate.silo.radius == pytest.approx(truth.radius, abs=0.002)
 
 
 @pytest.mark.parametrize("name", NAMES)

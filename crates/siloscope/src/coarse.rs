@@ -4,7 +4,7 @@ use crate::patches::{NONE, Patches};
 use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, NoiseLaw};
-use crate::start::{Oriented, Start, View, other_part, starts};
+use crate::start::{Oriented, Start, View, other_part, starts, steeper_cone};
 use crate::surface::{Part, PlacedSurface};
 use crate::verdict::{WallEvidence, wall_evidence};
 
@@ -67,7 +67,10 @@ fn candidates(problem: &Problem, view: View) -> Vec<(f64, Fit)> {
     let found = starts(&oriented(problem, &problem.prior.bias), view);
     let bar = 0.4 * found.first().map_or(0.0, |best| best.score);
     let mut refined: Vec<(f64, Fit)> = Vec::new();
-    for start in found.iter().take_while(|start| start.score >= bar).take(4) {
+    for start in found.iter().take_while(|start| start.score >= bar) {
+        if refined.len() == 4 {
+            break;
+        }
         if refined.iter().any(|(_, fit)| is_near(start, fit)) {
             continue;
         }
@@ -108,17 +111,37 @@ fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusal> {
         fit = with_other_part(problem, fit);
     }
     problem.refine(&mut fit, 3, 3, 0.15);
-    if fit.surface.cone.is_some_and(|c| c.slope > FEED_SLOPE) && !apex_is_covered(problem, &fit) {
-        if fit.surface.radius.is_none() {
-            return Err(Refusal::ConeMayBeFeed);
-        }
-        fit.surface.cone = None;
-        problem.refine(&mut fit, 3, 2, 0.15);
+    if may_be_feed(problem, &fit) {
+        fit = without_feed(problem, fit)?;
     }
     let wall = wall_patches(problem, &fit);
     let evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
     judge(&evidence, fit.inside, problem.patches.cloud)?;
     Ok(Settled { fit, wall, evidence })
+}
+
+/// Whether the cone could as well be feed.
+fn may_be_feed(problem: &Problem, fit: &Fit) -> bool {
+    fit.surface.cone.is_some_and(|c| c.slope > FEED_SLOPE) && !apex_is_covered(problem, fit)
+}
+
+/// The fit with a steeper cone about the same axis in place of one that may be feed, or else without a cone.
+fn without_feed(problem: &Problem, fit: Fit) -> Result<Fit, Refusal> {
+    if let Some(surface) = steeper_cone(&fit.surface, FEED_SLOPE, &oriented(problem, &fit.bias)) {
+        let mut steeper = Fit { surface, misfit: 0.01 * surface.size(), ..fit.clone() };
+        problem.refine(&mut steeper, 6, 3, 0.2);
+        problem.refine(&mut steeper, 3, 2, 0.15);
+        if steeper.surface.cone.is_some() && !may_be_feed(problem, &steeper) {
+            return Ok(steeper);
+        }
+    }
+    if fit.surface.radius.is_none() {
+        return Err(Refusal::ConeMayBeFeed);
+    }
+    let mut alone = fit;
+    alone.surface.cone = None;
+    problem.refine(&mut alone, 3, 2, 0.15);
+    Ok(alone)
 }
 
 /// Whether something else lies well before the cone all around its vertex: then the cone is no surface of feed.

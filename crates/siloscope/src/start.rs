@@ -90,6 +90,10 @@ const REACH: f64 = 0.04;
 /// The same once the axis has been refined.
 const FINE_REACH: f64 = 0.015;
 
+/// Slopes of cones that silos have, and feed.
+const STEEPEST: f64 = 0.1;
+const SHALLOWEST: f64 = 2.7;
+
 /// From where the wall may be seen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum View {
@@ -281,7 +285,9 @@ fn complete(h: &Hypothesis, sample: &[Oriented]) -> Vec<Start> {
     };
     let mut found = vec![alone];
     match h.shape {
-        Shape::Cylinder { inside: true, .. } => found.extend(best_cone(&alone.0, REACH, &local).map(|s| (s, true))),
+        Shape::Cylinder { inside: true, .. } => {
+            found.extend(best_cone(&alone.0, STEEPEST..SHALLOWEST, REACH, &local).map(|s| (s, true)))
+        }
         Shape::Cone { .. } => found.extend(best_cylinder(&alone.0, REACH, &local).map(|s| (s, true))),
         Shape::Cylinder { .. } => {}
     }
@@ -295,10 +301,16 @@ fn complete(h: &Hypothesis, sample: &[Oriented]) -> Vec<Start> {
 pub fn other_part(surface: &SiloSurface, patches: &[Oriented]) -> Option<SiloSurface> {
     let local = in_silo(&surface.pose, &thinned(patches, 3 * SCORED));
     if surface.cone.is_none() {
-        best_cone(surface, FINE_REACH, &local)
+        best_cone(surface, STEEPEST..SHALLOWEST, FINE_REACH, &local)
     } else {
         best_cylinder(surface, FINE_REACH, &local)
     }
+}
+
+/// The surface with another cone, of less than `slope`, in place of its own, where patches (camera frame) ask for one.
+pub fn steeper_cone(surface: &SiloSurface, slope: f64, patches: &[Oriented]) -> Option<SiloSurface> {
+    let local = in_silo(&surface.pose, &thinned(patches, 3 * SCORED));
+    best_cone(&SiloSurface { cone: None, ..*surface }, STEEPEST..slope, FINE_REACH, &local)
 }
 
 fn in_silo(pose: &SiloPose, patches: &[Oriented]) -> Vec<Oriented> {
@@ -328,15 +340,21 @@ fn profile_agreement(s: &SiloSurface, inside: bool, reach: f64, o: &Oriented) ->
     }
 }
 
-/// Below a known cylinder, the cone that most patches agree with; each patch proposes one by its normal.
-fn best_cone(cylinder: &SiloSurface, reach: f64, local: &[Oriented]) -> Option<SiloSurface> {
-    let radius = cylinder.radius?;
+/// The cone of a slope in `slopes` that most patches agree with, below the cylinder where there is one; each patch
+/// proposes one by its normal.
+fn best_cone(
+    cylinder: &SiloSurface,
+    slopes: std::ops::Range<f64>,
+    reach: f64,
+    local: &[Oriented],
+) -> Option<SiloSurface> {
+    let radius = cylinder.radius.unwrap_or(f64::INFINITY);
     let proposals = local.iter().filter_map(|o| {
         let (rho, n_rho, n_z) = o.meridian();
         let slope = n_z / n_rho;
         let cone = Cone { slope, apex: o.p.z + rho / slope };
         let meridian = n_rho.hypot(n_z) > 0.97;
-        let possible = n_rho < 0.0 && (0.1..2.7).contains(&slope) && rho < 0.97 * radius && meridian;
+        let possible = n_rho < 0.0 && slopes.contains(&slope) && rho < 0.97 * radius && meridian;
         possible.then_some(SiloSurface { cone: Some(cone), ..*cylinder })
     });
     best(proposals, profile_score(cylinder, true, reach, local), reach, local)
