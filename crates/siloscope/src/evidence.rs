@@ -69,8 +69,8 @@ pub fn placed_walls(kept: &[Candidate], points: &[Vec3], normals: &[Vec3], pose:
 /// Fewest walls that are evidence of anything.
 const LEAST_WALLS: usize = 30;
 /// Least share of the walls among the candidates, and among all points.
-const LEAST_KEPT: f64 = 0.35;
-const LEAST_SHARE: f64 = 0.08;
+const LEAST_KEPT: f64 = 0.25;
+const LEAST_SHARE: f64 = 0.05;
 /// Least spread of E1 about the axis: walls over an arc of some 30°.
 const LEAST_AROUND: f64 = 0.06;
 /// Range of `miss`.
