@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 from siloscope.calibrate import calibrate
+from siloscope.calibration import Calibration
 from siloscope.paper.evaluation.adjustments import Column
 from siloscope.paper.evaluation.series import LAST, Series
+from siloscope.paper.evaluation.verdicts import listed
 from siloscope.paper.solvers import SOLVERS, SURFACE
 from siloscope.pose import SiloPose
 
@@ -29,5 +32,16 @@ def _mean(series: Series, *, solver: str) -> SiloPose | None:
     return series.mean_of_last(solver, LAST)
 
 
+def refusals(series: Sequence[Series]) -> str:
+    """A sentence on fusions that are refused."""
+    found = [(one.name, SOLVERS[name].heading, _calibration(one, name)) for one in series for name in SURFACE]
+    told = [f"`{heading}` in {silo} ({fused.reason})" for silo, heading, fused in found if fused.pose is None]
+    return f"Fusions that are refused, and why: {listed(told)}."
+
+
 def _fused(series: Series, *, solver: str) -> SiloPose | None:
-    return calibrate([answer.estimate() for answer in series.answers(solver)]).pose
+    return _calibration(series, solver).pose
+
+
+def _calibration(series: Series, solver: str) -> Calibration:
+    return calibrate([answer.estimate() for answer in series.answers(solver)])

@@ -10,7 +10,7 @@ from siloscope.paper.discharges import perturbed
 from siloscope.paper.evaluation import published
 from siloscope.paper.evaluation.adjustments import Adjusted
 from siloscope.paper.evaluation.chapter import Chapter, Verdict
-from siloscope.paper.evaluation.fusing import columns, fusion
+from siloscope.paper.evaluation.fusing import columns, fusion, refusals
 from siloscope.paper.evaluation.honesty import coverage, too_small, wrong_answers
 from siloscope.paper.evaluation.pictures import clouds, curves
 from siloscope.paper.evaluation.plan import Plan
@@ -51,6 +51,7 @@ def chapter(plan: Plan, results: Results) -> Chapter:
         (
             INTRODUCTION,
             adjusted.table("table4", title, published.TABLE4, ""),
+            refusals(series),
             coverage("table4-coverage", "Answers and honesty, perturbed silos", series),
             wrong_answers(series),
             too_small(series, UNSEEN_BIAS),

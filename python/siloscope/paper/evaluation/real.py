@@ -9,7 +9,7 @@ from siloscope.paper.discharges import real
 from siloscope.paper.evaluation import published
 from siloscope.paper.evaluation.adjustments import Adjusted
 from siloscope.paper.evaluation.chapter import Chapter, Verdict
-from siloscope.paper.evaluation.fusing import columns
+from siloscope.paper.evaluation.fusing import columns, refusals
 from siloscope.paper.evaluation.honesty import answered, coverage, too_small, wrong_answers
 from siloscope.paper.evaluation.pictures import clouds, curves
 from siloscope.paper.evaluation.plan import Plan
@@ -52,6 +52,7 @@ def chapter(plan: Plan, results: Results) -> Chapter:
         (
             INTRODUCTION,
             adjusted.table("table5", title, paper, "The paper's SiloR2 rotations are probably in rad, not mrad."),
+            refusals(series),
             coverage("table5-coverage", "Answers and honesty, stand-ins", series),
             wrong_answers(series),
             too_small(series, UNSEEN_SHAPE),
