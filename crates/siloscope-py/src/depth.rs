@@ -38,7 +38,7 @@ fn converted<'py, T: Element + Sync>(
         Some(slice) => py.detach(|| slice.iter().map(&metres).collect()),
         None => array.iter().map(&metres).collect(),
     };
-    let valid = values.iter().map(|&z| usize::from(z > 0.0)).sum();
+    let valid = values.chunks(1 << 20).map(|part| part.iter().map(|&z| u32::from(z > 0.0)).sum::<u32>() as usize).sum();
     Ok((PyArray1::from_vec(py, values).reshape(shape)?, valid))
 }
 

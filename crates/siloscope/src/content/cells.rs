@@ -20,12 +20,12 @@ const COHERENT: f32 = 0.02;
 #[derive(Debug, Clone)]
 pub struct Bound {
     radius: f32,
-    /// Squared radius within which no return can belong to the wall.
-    inside: f32,
     top: f32,
     camera: [f32; 2],
-    /// For each step of depth, `2 k σ_d` and `2 k R σ_R`.
+    /// For each step of depth d, `2 k σ_d / d` and `2 k R σ_R`.
     margins: Vec<[f32; 2]>,
+    /// For each step of depth, the squared radius within which no return up to there can belong to the wall.
+    inside: Vec<f32>,
 }
 
 /// Step of the margins' table, metres.
@@ -74,31 +74,42 @@ impl Bound {
     pub fn new(radius: f64, variance: [f64; 2], noise: &NoiseLaw, reach: f64, top: f64, camera: [f64; 2]) -> Self {
         let steps = (reach.clamp(0.0, 1e3) / f64::from(STEP)) as usize + 2;
         let margin = |i: usize| {
-            let d = i as f64 * f64::from(STEP);
+            let d = (i as f64 + 0.5) * f64::from(STEP);
             let lateral = (variance[0] + variance[1] * d * d).sqrt();
-            [(2.0 * WALL_SIGMAS * noise.sigma(d)) as f32, (2.0 * WALL_SIGMAS * radius * lateral) as f32]
+            [(2.0 * WALL_SIGMAS * noise.sigma(d) / d) as f32, (2.0 * WALL_SIGMAS * radius * lateral) as f32]
         };
         let margins: Vec<[f32; 2]> = (0..steps).map(margin).collect();
-        let widest = margins.iter().fold(0.0f64, |most, m| most.max(f64::from(m[0]) * radius * 2.0 + f64::from(m[1])));
+        // at the wall |p · ray| d is at most R (R + |camera|), and at most 2 R d as no ray is flatter than 2 : 1
+        let (across, mut widest) = (radius + camera[0].hypot(camera[1]), 0.0f64);
+        let inside = margins.iter().enumerate().map(|(i, m)| {
+            let along = radius * across.min(2.0 * (i as f64 + 1.0) * f64::from(STEP));
+            widest = widest.max(f64::from(m[0]) * along + f64::from(m[1]));
+            (radius * radius - widest).max(0.0) as f32
+        });
         Self {
             radius: radius as f32,
-            inside: (radius * radius - widest).max(0.0) as f32,
             top: top as f32,
             camera: camera.map(|c| c as f32),
+            inside: inside.collect(),
             margins,
         }
     }
 
+    /// Squared radius within which no return of a line can belong to the wall.
+    fn inside(&self, line: &Line) -> f32 {
+        self.inside.get(self.step(farthest(&line.depth))).copied().unwrap_or(0.0)
+    }
+
     /// Whether a return is so far inside that nothing else needs to be looked at.
     #[inline]
-    fn surely_inside(&self, square: f32, z: f32) -> bool {
-        square < self.inside && z >= self.top
+    fn surely_inside(&self, inside: f32, square: f32, z: f32) -> bool {
+        square < inside && z >= self.top
     }
 
     /// Tells a return on the wall from one inside; |Δr| ≤ k σ is tested as |r² − R²| ≤ 2 k (|p·ray| σ_d + R σ_R).
     fn side(&self, [x, y, z]: [f32; 3], depth: f32) -> Side {
         let [by_depth, by_radius] = self.margin(depth);
-        let along = (x * (x - self.camera[0]) + y * (y - self.camera[1])).abs() / depth;
+        let along = (x * (x - self.camera[0]) + y * (y - self.camera[1])).abs();
         let margin = by_depth * along + by_radius;
         let excess = x * x + y * y - self.radius * self.radius;
         let beyond = excess > margin || excess.is_nan();
@@ -122,10 +133,21 @@ impl Bound {
 
     #[inline]
     fn margin(&self, depth: f32) -> [f32; 2] {
-        let last = self.margins.len().saturating_sub(1);
-        let i = ((depth * (1.0 / STEP)) as usize).min(last);
-        self.margins.get(i).copied().unwrap_or([0.0; 2])
+        self.margins.get(self.step(depth)).copied().unwrap_or([0.0; 2])
     }
+
+    #[inline]
+    fn step(&self, depth: f32) -> usize {
+        ((depth * (1.0 / STEP)) as usize).min(self.margins.len().saturating_sub(1))
+    }
+}
+
+/// Largest depth, four at a time.
+fn farthest(depth: &[f32]) -> f32 {
+    let (chunks, rest) = depth.as_chunks::<4>();
+    let most = |a: f32, b: f32| if b > a { b } else { a };
+    let four = chunks.iter().fold([0.0; 4], |m, d| [0, 1, 2, 3].map(|k| most(m[k], d[k])));
+    four.into_iter().chain(rest.iter().copied()).fold(0.0, most)
 }
 
 /// What the returns over one cell say.
@@ -196,7 +218,6 @@ pub fn gather(
         windows: survey(returns, bound, grid, noise),
         cells: vec![Cell::default(); grid.count()],
         tally: Tally::default(),
-        run: Run::default(),
         floating: f32::INFINITY,
     };
     let mut places = Places::default();
@@ -204,7 +225,6 @@ pub fn gather(
         places.work_out(line, grid);
         sums.add(line, &places);
     });
-    sums.flush();
     sums.cells.iter_mut().for_each(|cell| cell.finish(noise, lever));
     (sums.cells, sums.tally)
 }
@@ -212,9 +232,9 @@ pub fn gather(
 /// Returns one after another over the same cell, not yet added to it: their sum of x, y, z and 1.
 ///
 /// A run is some ten returns long, so single precision loses nothing.
-#[derive(Debug, Clone, Copy, Default)]
 struct Run {
     cell: u32,
+    window: Window,
     sum: [f32; 4],
 }
 
@@ -224,42 +244,44 @@ struct Gathering<'a> {
     windows: Vec<Window>,
     cells: Vec<Cell>,
     tally: Tally,
-    run: Run,
     floating: f32,
 }
 
 impl Gathering<'_> {
     fn add(&mut self, line: &Line, places: &Places) {
+        let (inside, mut wall, mut outside) = (self.bound.inside(line), 0, 0);
+        let mut run = Run { cell: u32::MAX, window: CLOSED, sum: [0.0; 4] }; // a local one stays in registers
         let points = line.x.iter().zip(&line.y).zip(&line.z).zip(&line.depth);
         for ((((&x, &y), &z), &depth), (&cell, &square)) in points.zip(places.cell.iter().zip(&places.square)) {
             if depth <= 0.0 {
                 continue;
             }
-            if self.bound.surely_inside(square, z) {
-                self.over(cell, [x, y, z], depth);
-                continue;
+            if !self.bound.surely_inside(inside, square, z) {
+                let side = self.bound.side([x, y, z], depth);
+                wall += u32::from(side == Side::Wall);
+                outside += u32::from(side == Side::Outside);
+                if side != Side::Inside {
+                    continue;
+                }
             }
-            match self.bound.side([x, y, z], depth) {
-                Side::Inside => self.over(cell, [x, y, z], depth),
-                Side::Wall => self.tally.wall += 1.0,
-                Side::Outside => self.tally.outside += 1.0,
+            if cell != run.cell {
+                self.flush(&run);
+                run = Run { cell, window: self.window(cell), sum: [0.0; 4] };
+            }
+            if run.window.holds(z) {
+                run.sum.iter_mut().zip([x, y, z, 1.0]).for_each(|(sum, part)| *sum += part);
+            } else {
+                self.stray(cell, z < run.window.low, depth);
             }
         }
-        self.tally.returns += line.depth.iter().filter(|&&d| d > 0.0).count() as f64;
+        self.flush(&run);
+        self.tally.wall += f64::from(wall);
+        self.tally.outside += f64::from(outside);
+        self.tally.returns += f64::from(line.depth.iter().map(|&d| u32::from(d > 0.0)).sum::<u32>());
     }
 
-    #[inline]
-    fn over(&mut self, cell: u32, [x, y, z]: [f32; 3], depth: f32) {
-        let window = self.windows.get(cell as usize).copied().unwrap_or(CLOSED);
-        if z >= window.low && z <= window.high {
-            if cell != self.run.cell {
-                self.flush();
-                self.run.cell = cell;
-            }
-            self.run.sum.iter_mut().zip([x, y, z, 1.0]).for_each(|(sum, part)| *sum += part);
-        } else {
-            self.stray(cell, z < window.low, depth);
-        }
+    fn window(&self, cell: u32) -> Window {
+        self.windows.get(cell as usize).copied().unwrap_or(CLOSED)
     }
 
     /// A return above or below the surface.
@@ -276,8 +298,7 @@ impl Gathering<'_> {
         self.floating = depth;
     }
 
-    fn flush(&mut self) {
-        let run = std::mem::take(&mut self.run);
+    fn flush(&mut self, run: &Run) {
         let [x, y, z, count] = run.sum.map(f64::from);
         if let Some(cell) = self.cells.get_mut(run.cell as usize) {
             cell.count += count;
@@ -296,14 +317,15 @@ fn survey(returns: &Returns<'_>, bound: &Bound, grid: &Grid, noise: &NoiseLaw) -
     let mut places = Places::default();
     returns.visit(stride, |line| {
         places.work_out(line, grid);
+        let inside = bound.inside(line);
         for i in (0..line.len()).filter(|&i| line.depth[i] > 0.0) {
             let (point, depth) = ([line.x[i], line.y[i], line.z[i]], line.depth[i]);
-            if bound.surely_inside(places.square[i], point[2]) || bound.side(point, depth) == Side::Inside {
+            if bound.surely_inside(inside, places.square[i], point[2]) || bound.side(point, depth) == Side::Inside {
                 samples.push((places.cell[i], point[2], depth));
             }
         }
     });
-    samples.sort_unstable_by_key(|s| s.0);
+    let mut samples = by_cell(&samples, grid.count());
     let mut windows = vec![CLOSED; grid.count()];
     for group in samples.chunk_by_mut(|a, b| a.0 == b.0) {
         if let Some(window) = group.first().and_then(|s| windows.get_mut(s.0 as usize)) {
@@ -319,7 +341,28 @@ fn survey(returns: &Returns<'_>, bound: &Bound, grid: &Grid, noise: &NoiseLaw) -
     windows
 }
 
+/// The samples sorted by their cells, each counted and put into its place.
+fn by_cell(samples: &[Sample], cells: usize) -> Vec<Sample> {
+    let mut place = vec![0usize; cells + 1];
+    samples.iter().for_each(|s| place[s.0 as usize + 1] += 1);
+    for i in 0..cells {
+        place[i + 1] += place[i];
+    }
+    let mut sorted = samples.to_vec();
+    for sample in samples {
+        let at = &mut place[sample.0 as usize];
+        sorted[*at] = *sample;
+        *at += 1;
+    }
+    sorted
+}
+
 impl Window {
+    #[inline]
+    fn holds(&self, z: f32) -> bool {
+        z >= self.low && z <= self.high
+    }
+
     /// The window over both.
     fn with(self, other: &Self) -> Self {
         Self { low: self.low.min(other.low), high: self.high.max(other.high) }

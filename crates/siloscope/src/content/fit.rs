@@ -76,7 +76,8 @@ impl Surface {
 
     /// z of the surface at a place.
     pub fn height(&self, x: f64, y: f64) -> f64 {
-        self.trend_at(x, y)[0] + detail::between(&self.grid, &self.detail, x, y)
+        let trend = self.basis.height(unit(&self.grid, [x, y, 0.0]), self.trend.coefficients.as_slice());
+        self.datum + trend * self.grid.reach + detail::between(&self.grid, &self.detail, x, y)
     }
 
     /// Standard deviation of the height at each cell's middle: the trend's, and the detail's where it is not seen.

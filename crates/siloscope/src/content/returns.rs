@@ -119,10 +119,10 @@ impl<'a> Returns<'a> {
                 }
             }
             Source::Depth(depth, Rays::Pinhole(columns, rows)) if !columns.is_empty() => {
+                line.resize(columns.len().div_ceil(stride));
+                copy(&mut line.rays[0], columns, stride);
                 for (row, &y) in depth.chunks_exact(columns.len()).zip(rows).step_by(stride) {
-                    line.resize(row.len().div_ceil(stride));
                     copy(&mut line.depth, row, stride);
-                    copy(&mut line.rays[0], columns, stride);
                     line.rays[1].fill(y);
                     finish(&mut line);
                 }
