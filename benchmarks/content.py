@@ -1,158 +1,184 @@
-"""How far the measured volume is off, on silos that nobody has seen: perturbed frames, calibrated from five others.
+"""How far the measured volume is off on unseen silos, how true its deviation is, and how long `measure` takes.
 
-    python benchmarks/content.py [--silos N] [--first SEED] [--unknown] [--true-pose] [--json]
+    python -m benchmarks.content --write
 
-Every silo is `siloscope.paper.scenarios.random_scene`; it is calibrated from five frames of an earlier discharge, then
-Gaussian, funnel, mound and tilted feed is measured at 75, 45 and 20 % level. Errors are in % of the silo's capacity.
+Every silo is `siloscope.paper.scenarios.random_scene` with the Astra S's error. It is calibrated from five frames of an
+earlier discharge; then Gaussian, funnel, mound and tilted feed is measured at 75, 45 and 20 % level. Errors are in % of
+the silo's capacity.
 """
 
 from __future__ import annotations
 
-import argparse
-import json
+import io
+import statistics
 import time
-from collections.abc import Iterator
-from dataclasses import replace
-from typing import Any
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from benchmarks import trials
+from benchmarks.trials import DIAMETER, KNOWN, Knowledge
+from PIL import Image
 
 import siloscope
-from siloscope.errors import UsageError
 from siloscope.paper.scenarios import random_scene
-from siloscope.scene import ASTRA_S, Feed, Scene
-from siloscope.surface import PARAMETERS
+from siloscope.scene import ASTRA_S, Feed, Scene, SimulatedFrame
 
 SHAPES = ("gaussian", "funnel", "mound", "tilted")
 LEVELS = (0.75, 0.45, 0.20)
 EARLIER = (0.7, 0.5, 0.35, 0.2, 0.05)
 """Levels of the discharge that the silo is calibrated from."""
+GOALS = {KNOWN.name: (0.3, 1.5), DIAMETER.name: (0.6, 2.5)}
+"""Median and worst error, % of the capacity."""
+REPEAT = 15
+"""Runs of which the median is the time."""
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One frame's volume beside its truth, in % of the capacity; NaN without a volume."""
+
+    seed: int
+    shape: str
+    level: float
+    error: float
+    std: float
+    why: str
+    """Why there is no volume; empty where there is one."""
 
 
 def main() -> None:
-    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("--silos", type=int, default=12)
-    options.add_argument("--first", type=int, default=5000, help="seed of the first silo")
-    options.add_argument("--unknown", action="store_true", help="no sensor profile, but the diameter")
-    options.add_argument("--true-pose", action="store_true", help="the true pose and geometry instead of a calibration")
-    options.add_argument("--json", action="store_true")
-    chosen = options.parse_args()
-    rows = [row for seed in range(chosen.first, chosen.first + chosen.silos) for row in silo(seed, chosen)]
-    summary = summarise(rows)
-    if chosen.json:
-        print(json.dumps({"rows": rows, "summary": summary}, indent=1))
-        return
-    for row in rows:
-        print(line(row))
-    print(json.dumps(summary))
+    """Prints the tables; with --write puts them into the manual."""
+    options = trials.arguments(__doc__, silos=24, first=6000)
+    seeds = range(options.first, options.first + options.silos)
+    found: dict[str, list[Reading]] = {}
+    for known in (KNOWN, DIAMETER):
+        each = trials.each(list(seeds), lambda seed, known=known: list(silo(seed, known)), options.jobs, known.name)
+        found[known.name] = [reading for readings in each for reading in readings]
+    if options.list:
+        print("\n".join(line(reading) for readings in found.values() for reading in readings))
+    page = trials.ROOT / "docs" / "content.md"
+    text = "\n\n".join([accuracy(found), *(missing(name, readings) for name, readings in found.items())])
+    trials.publish("accuracy", text, options.write, "benchmarks.content", page)
+    trials.publish("levels", by_level(found[KNOWN.name]), options.write, "benchmarks.content", page)
+    trials.publish("times", times(seeds), options.write, "benchmarks.content", page)
 
 
-def silo(seed: int, chosen: argparse.Namespace) -> Iterator[dict[str, Any]]:
+def silo(seed: int, known: Knowledge) -> Iterator[Reading]:
     """All readings of one silo."""
     scene = random_scene(seed, sensor=ASTRA_S)
-    settings: dict[str, Any] = {"sensor": "orbbec-astra-s"}
-    if chosen.unknown:
-        settings = {"diameter": 2.0 * scene.silo.radius}
-    calibration = truth(scene) if chosen.true_pose else calibrated(scene, settings)
+    calibration = calibrated(scene, known)
     draw = np.random.default_rng(seed)
     for shape in SHAPES:
         for level in LEVELS:
-            yield reading(seed, scene, shape, level, calibration, settings, draw)
+            yield reading(seed, content(scene, shape, level, draw), calibration)
 
 
-def calibrated(scene: Scene, settings: dict[str, Any]) -> siloscope.Calibration:
-    earlier = [
-        replace(scene, feed=Feed("gaussian", level), seed=scene.seed + 100 + i) for i, level in enumerate(EARLIER)
-    ]
-    return siloscope.calibrate([s.render().frame() for s in earlier], **settings)
+def calibrated(scene: Scene, known: Knowledge) -> siloscope.Calibration:
+    """What five frames of an earlier discharge tell."""
+    earlier = [replace(scene, feed=Feed("gaussian", at), seed=scene.seed + 100 + i) for i, at in enumerate(EARLIER)]
+    diameter = 2.0 * scene.silo.radius if known.diameter else None
+    return siloscope.calibrate([s.render().frame() for s in earlier], sensor=known.profile, diameter=diameter)
 
 
-def truth(scene: Scene) -> siloscope.Calibration:
-    """A calibration without error."""
-    g, pose = scene.silo.geometry, scene.pose
-    slope = g.radius / (g.apex - g.cylinder_bottom)
-    values = [pose.r_x, pose.r_y, pose.t_x, pose.t_y, g.radius, slope, g.apex, *scene.sensor.bias, 0.0, 0.0]
-    profile = siloscope.sensors.load("orbbec-astra-s").to_dict()
-    return siloscope.Calibration(
-        "ok",
-        pose=pose,
-        covariance=np.zeros((4, 4)),
-        silo=g,
-        parameters=np.array(values),
-        parameter_covariance=np.zeros((len(PARAMETERS),) * 2),
-        config={"sensor": profile},
-    )
+def content(scene: Scene, shape: str, level: float, draw: np.random.Generator) -> Scene:
+    """The silo with feed whose angles are drawn."""
+    angle, tilt, azimuth = draw.uniform(0.35, 0.6), draw.uniform(0.05, 0.4), draw.uniform(0.0, 6.28)
+    feed = Feed(shape, level, angle=angle, tilt=tilt if shape == "tilted" else None, tilt_azimuth=azimuth)
+    return replace(scene, feed=feed, seed=scene.seed + 1000 * int(100 * level))
 
 
-def reading(
-    seed: int,
-    scene: Scene,
-    shape: str,
-    level: float,
-    calibration: siloscope.Calibration,
-    settings: dict[str, Any],
-    draw: np.random.Generator,
-) -> dict[str, Any]:
-    """One reading beside its truth, in % of the capacity."""
-    feed = Feed(
-        shape,
-        level,
-        angle=float(draw.uniform(0.35, 0.6)),
-        tilt=float(draw.uniform(0.05, 0.4)) if shape == "tilted" else None,
-        tilt_azimuth=float(draw.uniform(0.0, 6.28)),
-    )
-    row: dict[str, Any] = {"seed": seed, "shape": shape, "level": level}
-    try:
-        frame = replace(scene, feed=feed, seed=scene.seed + 1000 * int(100 * level)).render()
-    except UsageError as error:
-        return {**row, "status": "not rendered", "reason": str(error)}
-    if not calibration.ok:
-        return {**row, "status": "no calibration", "reason": calibration.reason or ",".join(calibration.quality)}
-    sensor = {k: v for k, v in settings.items() if k == "sensor"}
-    start = time.process_time()
-    found = siloscope.measure(frame.frame(), calibration, **sensor)
-    row |= {
-        "ms": 1e3 * (time.process_time() - start),
-        "status": found.status,
-        "reason": found.reason,
-        "coverage": found.coverage,
-        "quality": [r.code for r in found.quality],
-    }
-    if found.volume is None:
-        return row
+def reading(seed: int, scene: Scene, calibration: siloscope.Calibration) -> Reading:
+    """One frame measured."""
+    feed = scene.feed
+    assert feed is not None
+    frame = scene.render()
+    found = siloscope.measure(frame.frame(), calibration)
+    if found.volume is None or found.volume_std is None:
+        why = found.reason or f"{', '.join(found.missing)} never seen"
+        return Reading(seed, feed.shape, feed.level, np.nan, np.nan, why)
     percent = 100.0 / scene.silo.capacity
-    return {
-        **row,
-        "error": percent * (found.volume - frame.true_volume),
-        "std": percent * found.volume_std,
-        **{f"std_{k}": percent * v for k, v in found.parts.to_dict().items()},
-    }
+    error = percent * (found.volume - frame.true_volume)
+    return Reading(seed, feed.shape, feed.level, error, percent * found.volume_std, "")
 
 
-def summarise(rows: list[dict[str, Any]]) -> dict[str, Any]:
-    told = [row for row in rows if "error" in row]
-    error = np.array([row["error"] for row in told])
-    std = np.array([row["std"] for row in told])
-    return {
-        "readings": len(rows),
-        "answered": len(told),
-        "not_rendered": sum(row["status"] == "not rendered" for row in rows),
-        "median_percent": float(np.median(np.abs(error))),
-        "worst_percent": float(np.abs(error).max()),
-        "within_1_std": float((np.abs(error) <= std).mean()),
-        "within_2_std": float((np.abs(error) <= 2.0 * std).mean()),
-        "rms_of_error_over_std": float(np.sqrt(np.mean((error / std) ** 2))),
-        "median_ms": float(np.median([row["ms"] for row in told])),
-    }
+def told(readings: Sequence[Reading]) -> tuple[np.ndarray, np.ndarray]:
+    """Errors and deviations of the readings that have a volume."""
+    pairs = np.array([(r.error, r.std) for r in readings if not r.why]).reshape(-1, 2)
+    return pairs[:, 0], pairs[:, 1]
 
 
-def line(row: dict[str, Any]) -> str:
-    head = f"{row['seed']} {row['shape']:9s} {row['level']:.2f}"
-    if "error" not in row:
-        return f"{head} {row['status']}: {row['reason']}"
-    parts = " ".join(f"{k[4:]} {v:.4f}" for k, v in row.items() if k.startswith("std_"))
-    found = f"seen {row['coverage']:.2f} error {row['error']:+.4f} std {row['std']:.4f} ({parts})"
-    return f"{head} {found} {row['ms']:.1f} ms {','.join(row['quality'])}"
+def accuracy(found: dict[str, list[Reading]]) -> str:
+    """One line for each kind of knowledge."""
+    head = ("", "readings", "with a volume", "median, %", "goal", "worst, %", "goal", "within 2 std", "goal")
+    rows = []
+    for name, readings in found.items():
+        error, std = told(readings)
+        median, worst = GOALS[name]
+        within = f"{100 * np.mean(np.abs(error) <= 2 * std):.1f} %"
+        figures = (f"{np.median(np.abs(error)):.4f}", median, f"{np.abs(error).max():.3f}", worst, within, "90–99 %")
+        rows.append((name, len(readings), len(error), *figures))
+    return trials.table(head, rows)
+
+
+def missing(name: str, readings: Sequence[Reading]) -> str:
+    """How many readings have no volume, and why."""
+    causes = Counter(reading.why for reading in readings if reading.why)
+    if not causes:
+        return f"{name[0].upper()}{name[1:]}: every reading has a volume."
+    listed = "; ".join(f"{count} × {why}" for why, count in causes.most_common())
+    return f"{name[0].upper()}{name[1:]}, without a volume: {listed}."
+
+
+def by_level(readings: Sequence[Reading]) -> str:
+    """Error and stated deviation for shape and level."""
+    head = ("median error (stated std), %", *(f"{100 * level:.0f} %" for level in LEVELS))
+    rows = []
+    for shape in SHAPES:
+        cells = []
+        for level in LEVELS:
+            error, std = told([r for r in readings if r.shape == shape and r.level == level])
+            cells.append(f"{np.median(np.abs(error)):.4f} ({np.median(std):.4f})" if len(error) else "none")
+        rows.append((shape, *cells))
+    return trials.table(head, rows)
+
+
+def times(seeds: Sequence[int]) -> str:
+    """Processor time of `measure` on a depth array beside a PNG decode, one thread."""
+    ratios: list[float] = []
+    for seed in list(seeds)[:6]:
+        scene = random_scene(seed, sensor=ASTRA_S)
+        calibration = calibrated(scene, KNOWN)
+        draw = np.random.default_rng(seed)
+        ratios += [ratio(content(scene, shape, 0.45, draw).render(), calibration) for shape in SHAPES]
+    text = f"`measure` on a depth array takes {statistics.median(ratios):.2f} PNG decodes of processor time"
+    return f"{text} (median of {len(ratios)} frames; slowest {max(ratios):.2f}; goal 2)."
+
+
+def ratio(frame: SimulatedFrame, calibration: siloscope.Calibration) -> float:
+    """Time of `measure` over that of Pillow decoding the frame's 16-bit PNG."""
+    buffer = io.BytesIO()
+    Image.fromarray(frame.raw(0.001)).save(buffer, "PNG")
+    depth = frame.measured.astype(np.float32)
+    decode = milliseconds(lambda: np.asarray(Image.open(io.BytesIO(buffer.getvalue()))))
+    return milliseconds(lambda: siloscope.measure(depth, calibration, frame.camera)) / decode
+
+
+def milliseconds(run: Callable[[], object]) -> float:
+    """Median processor time of a call."""
+    spent = []
+    for _ in range(REPEAT):
+        start = time.process_time()
+        run()
+        spent.append(1e3 * (time.process_time() - start))
+    return statistics.median(spent)
+
+
+def line(reading: Reading) -> str:
+    """One reading as text."""
+    head = f"{reading.seed} {reading.shape:9s} {reading.level:.2f}"
+    return f"{head} {reading.why}" if reading.why else f"{head} error {reading.error:+.4f} std {reading.std:.4f}"
 
 
 if __name__ == "__main__":

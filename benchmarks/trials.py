@@ -20,7 +20,8 @@ from siloscope.paper.scenarios import random_big_scene, random_scene, scenario
 from siloscope.scene import ASTRA_S, PERFECT, Feed, Scene, SimulatedFrame
 from siloscope.sensors import SensorProfile
 
-ACCURACY_PAGE = Path(__file__).parents[1] / "docs" / "accuracy.md"
+ROOT = Path(__file__).parents[1]
+ACCURACY_PAGE = ROOT / "docs" / "accuracy.md"
 
 LIDAR_PROFILE = SensorProfile("lidar-like", noise=(0.0, 0.01, 0.0, 0.0, 0.0, 2.0))
 """The profile of `siloscope.paper.scenarios.LIDAR_NOISE`."""
@@ -86,7 +87,7 @@ def arguments(description: str | None, **options: int) -> argparse.Namespace:
     """The options that all benchmarks have, and whole numbers of their own."""
     parser = argparse.ArgumentParser(description=(description or "").splitlines()[0])
     parser.add_argument("--jobs", type=int, default=1, help="frames at the same time")
-    parser.add_argument("--write", action="store_true", help="write the table into docs/accuracy.md")
+    parser.add_argument("--write", action="store_true", help="write the tables into the manual")
     parser.add_argument("--list", action="store_true", help="list every frame")
     for name, default in options.items():
         parser.add_argument(f"--{name}", type=int, default=default)
@@ -99,16 +100,16 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join("| " + " | ".join(str(cell) for cell in line) + " |" for line in lines)
 
 
-def publish(name: str, text: str, write: bool, module: str) -> None:
-    """Prints a section, and puts it between its marks in the accuracy page with the command that made it."""
+def publish(name: str, text: str, write: bool, module: str, page: Path = ACCURACY_PAGE) -> None:
+    """Prints a section, and puts it between its marks in a page of the manual with the command that made it."""
     print(text)
     if not write:
         return
     command = shlex.join(["python", "-m", module, *sys.argv[1:]])
-    page = ACCURACY_PAGE.read_text()
+    whole = page.read_text()
     start, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
-    before, after = page.split(start)[0], page.split(end)[1]
-    ACCURACY_PAGE.write_text(f"{before}{start}\n{text}\n\nMade by `{command}`.\n{end}{after}")
+    before, after = whole.split(start)[0], whole.split(end)[1]
+    page.write_text(f"{before}{start}\n{text}\n\nMade by `{command}`.\n{end}{after}")
 
 
 def pose_error(estimate: Estimate, scene: Scene) -> np.ndarray:

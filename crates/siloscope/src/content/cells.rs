@@ -10,7 +10,7 @@ const WALL_SIGMAS: f64 = 4.0;
 /// Returns farther than so many robust standard deviations from their cell's median are clutter.
 const CLUTTER_SIGMAS: f32 = 4.0;
 /// Returns of which the medians are taken; more add time, not certainty.
-const SURVEYED: f64 = 20_000.0;
+const SURVEYED: f64 = 12_000.0;
 /// Fewest surveyed returns that make a median.
 const FEWEST: usize = 3;
 /// Two floating returns in a row whose depths differ by less than this share show a thing, not dust.

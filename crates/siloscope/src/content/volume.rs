@@ -11,8 +11,8 @@ use nalgebra::DVector;
 use std::f64::consts::TAU;
 
 /// Spokes, and pieces of a spoke before it is cut.
-const SPOKES: usize = 96;
-const PIECES: usize = 20;
+const SPOKES: usize = 72;
+const PIECES: usize = 16;
 /// Gauss's rule with two points on [0, 1], exact to the third power.
 const GAUSS: [f64; 2] = [0.211_324_865_405_187_1, 0.788_675_134_594_812_9];
 
