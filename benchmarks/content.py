@@ -22,8 +22,10 @@ from benchmarks.trials import DIAMETER, KNOWN, Knowledge
 from PIL import Image
 
 import siloscope
-from siloscope.paper.scenarios import random_scene
+from siloscope import sensors
+from siloscope.paper.scenarios import random_scene, scenario
 from siloscope.scene import ASTRA_S, Feed, Scene, SimulatedFrame
+from siloscope.sensors import SensorProfile
 
 SHAPES = ("gaussian", "funnel", "mound", "tilted")
 LEVELS = (0.75, 0.45, 0.20)
@@ -58,11 +60,13 @@ def main() -> None:
         found[known.name] = [reading for readings in each for reading in readings]
     if options.list:
         print("\n".join(line(reading) for readings in found.values() for reading in readings))
-    page = trials.ROOT / "docs" / "content.md"
+    manual = trials.ROOT / "docs"
+    page = manual / "content.md"
     text = "\n\n".join([accuracy(found), *(missing(name, readings) for name, readings in found.items())])
     trials.publish("accuracy", text, options.write, "benchmarks.content", page)
     trials.publish("levels", by_level(found[KNOWN.name]), options.write, "benchmarks.content", page)
     trials.publish("times", times(seeds), options.write, "benchmarks.content", page)
+    trials.publish("practice", practice(), options.write, "benchmarks.content", manual / "measuring.md")
 
 
 def silo(seed: int, known: Knowledge) -> Iterator[Reading]:
@@ -142,6 +146,53 @@ def by_level(readings: Sequence[Reading]) -> str:
             cells.append(f"{np.median(np.abs(error)):.4f} ({np.median(std):.4f})" if len(error) else "none")
         rows.append((shape, *cells))
     return trials.table(head, rows)
+
+
+UNBIASED = SensorProfile("unbiased", noise=sensors.load("orbbec-astra-s").noise)
+"""The Astra S without its bias."""
+
+PRACTICE: dict[str, Callable[[siloscope.Calibration, np.ndarray], tuple[siloscope.Calibration, np.ndarray]]] = {
+    "all lengths and depths 1 % too long": lambda silo, depth: (moved(silo, scale=0.01), 1.01 * depth),
+    "depths 5 mm too long, calibration right": lambda silo, depth: (silo, depth + 0.005 * (depth > 0.0)),
+    "radius 5 mm too large": lambda silo, depth: (moved(silo, radius=0.005), depth),
+    "cone's vertex 5 mm too low": lambda silo, depth: (moved(silo, apex=0.005), depth),
+    "camera turned by 1 mrad": lambda silo, depth: (moved(silo, turn=0.001), depth),
+    "camera shifted by 5 mm": lambda silo, depth: (moved(silo, shift=0.005), depth),
+}
+"""What may be wrong: a calibration and a depth image as they would then be."""
+
+
+def moved(
+    silo: siloscope.Calibration, scale: float = 0.0, radius: float = 0.0, apex: float = 0.0, **pose: float
+) -> siloscope.Calibration:
+    """The calibration with a wrong scale, radius, vertex, turn (rad) or shift (m)."""
+    assert silo.parameters is not None
+    values = silo.parameters.copy()
+    values[[2, 3, 4, 6]] *= 1.0 + scale
+    values[[0, 2, 4, 6]] += (pose.get("turn", 0.0), pose.get("shift", 0.0), radius, apex)
+    bottom = (1.0 + scale) * (silo.silo.cylinder_bottom or 0.0)
+    values[5] = values[4] / (values[6] - bottom)
+    geometry = siloscope.SiloGeometry(values[4], bottom, values[6])
+    return replace(silo, parameters=values, silo=geometry, pose=siloscope.SiloPose(*values[:4]))
+
+
+def practice() -> str:
+    """What single errors do to a reading."""
+    rows = []
+    scenes = [replace(scenario(name), feed=Feed("gaussian", 0.45)) for name in ("silo1", "silo2", "silo3")]
+    known = [
+        calibrated(scene, Knowledge("exact", SensorProfile("exact", noise=(5e-4, 0, 0, 0, 0, 1)))) for scene in scenes
+    ]
+    for name, wrong in PRACTICE.items():
+        row = [name]
+        for scene, silo in zip(scenes, known, strict=True):
+            frame = scene.render()
+            calibration, depth = wrong(silo, frame.depth)
+            right = siloscope.measure(frame.depth, silo, frame.camera).volume
+            off = siloscope.measure(depth, calibration, frame.camera).volume
+            row.append("refused" if right is None or off is None else f"{100 * (off / right - 1):+.2f} %")
+        rows.append(row)
+    return trials.table(("error", "Silo1", "Silo2", "Silo3"), rows)
 
 
 def times(seeds: Sequence[int]) -> str:

@@ -37,7 +37,7 @@ def degrees_apart(one: np.ndarray, other: np.ndarray) -> float:
 
 
 def test_every_example_is_tested() -> None:
-    tested = {"locate_simulated", "locate_mug", "locate_pot", "locate_tank"}
+    tested = {"locate_simulated", "locate_mug", "locate_pot", "locate_tank", "measure_discharge"}
     assert {path.stem for path in EXAMPLES.glob("*.py")} == tested
 
 
@@ -46,6 +46,14 @@ def test_simulated(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixtur
     lines = capsys.readouterr().out.splitlines()
     assert [line.split()[0] for line in lines] == ["surface", "shape-tensor"]
     assert all("Eq. 11" in line for line in lines)
+
+
+def test_discharge(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    run("measure_discharge", monkeypatch=monkeypatch)
+    volume, surface, event = capsys.readouterr().out.splitlines()
+    assert "m³" in volume
+    assert surface.startswith("funnel")
+    assert event.startswith("withdrawal")
 
 
 def test_mug_agrees_with_pcls_cylinder(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -92,5 +92,25 @@ def sensors() -> str:
     return "\n".join(["| name | where its figures come from |", "|---|---|", *rows])
 
 
+def content_quality() -> str:
+    """Every remark on a reading of the content."""
+    from siloscope.content.quality import QUALITY, REFUSING
+
+    rows = [
+        f"| `{code}` | {meaning} | {advice} | {'may leave no answer' if code in REFUSING else ''} |"
+        for code, (meaning, advice) in QUALITY.items()
+    ]
+    return "\n".join(["| code | what it means | what to do | |", "|---|---|---|---|", *rows])
+
+
+def products() -> str:
+    """Every product that comes with siloscope."""
+    from siloscope.content import products as known
+
+    rows = [f"| `{name}` | {p.loose:g} ± {p.std:g} | {p.source} |" for name, p in known().items()]
+    return "\n".join(["| product | kg/m³ | where the figures come from |", "|---|--:|---|", *rows])
+
+
 _PARTS: dict[str, Callable[[], str]] = {"commands": commands, "reasons": reasons, "sensors": sensors}
 _PARTS |= {"quality": quality, "calibration_reasons": calibration_reasons, "frame_statuses": frame_statuses}
+_PARTS |= {"content_quality": content_quality, "products": products}

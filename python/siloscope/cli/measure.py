@@ -40,6 +40,16 @@ Product = Annotated[
 ]
 
 
+SETTINGS = ("sensor", "diameter", "cylinder", "cone", "top", "outlet_diameter", "outlet_length", "strapping",
+            "density", "density_std", "product")  # fmt: skip
+"""Options that the library takes under the same names."""
+
+
+def chosen(given: dict[str, Any]) -> dict[str, Any]:
+    """What a command was given for `siloscope.measure`."""
+    return {name: given[name] for name in SETTINGS}
+
+
 def measure(
     file: Annotated[Path, typer.Argument(metavar="FRAME", help="Depth image, depth array, point cloud or recording.")],
     calibration: CalibrationFile = None,
@@ -72,25 +82,13 @@ def measure(
     Without --calibration the frame itself must show enough wall. Exit code 4: the frame was read well, but gives no
     trustworthy answer; the JSON says why.
     """
-    settings: dict[str, Any] = {
-        "sensor": sensor,
-        "diameter": diameter,
-        "cylinder": cylinder,
-        "cone": cone,
-        "top": top,
-        "outlet_diameter": outlet_diameter,
-        "outlet_length": outlet_length,
-        "strapping": strapping,
-        "density": density,
-        "density_std": density_std,
-        "product": product,
-    }
+    settings = chosen(locals())
     place = {"camera": camera, "depth_unit": depth_unit, "stream": stream}
     frame = _frame(file, number, place)
     silo = None if calibration is None else siloscope.Calibration.load(calibration)
     before = None if previous is None else siloscope.measure(_frame(previous, 0, place), silo, **settings)
-    chosen = None if mask is None else _mask(mask, frame)
-    content = siloscope.measure(frame, silo, mask=chosen, previous=before, **settings)
+    inside = None if mask is None else _mask(mask, frame)
+    content = siloscope.measure(frame, silo, mask=inside, previous=before, **settings)
     return _answer(content, out, as_json)
 
 

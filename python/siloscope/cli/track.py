@@ -6,7 +6,7 @@ import json
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 from rich.console import Console
@@ -64,19 +64,8 @@ def track(
 
     Exit code 4: no frame has an answer; 5: some have none.
     """
-    settings: dict[str, Any] = {
-        "sensor": sensor,
-        "diameter": diameter,
-        "cylinder": cylinder,
-        "cone": cone,
-        "top": top,
-        "outlet_diameter": outlet_diameter,
-        "outlet_length": outlet_length,
-        "strapping": None if strapping is None else siloscope.content.Strapping.read(strapping),
-        "density": density,
-        "density_std": density_std,
-        "product": product,
-    }
+    settings = one.chosen(locals())
+    settings["strapping"] = None if strapping is None else siloscope.content.Strapping.read(strapping)
     if parquet and out is None:
         raise UsageError("--parquet writes a file; give --out DIR")
     silo = siloscope.Calibration.load(calibration)

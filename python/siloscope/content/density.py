@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -141,7 +141,7 @@ def load(product: str) -> Density:
     except OSError as error:
         raise InputError(f"{path}: can't be read ({error.strerror}); check its name and permissions") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: no TOML product ({error}); see the manual's page on content") from None
+        raise InputError(f"{path}: no TOML product ({error}); docs/measuring.md has an example") from None
     return _product(str(table.pop("name", path.stem)), table)
 
 
@@ -178,8 +178,6 @@ def _number(density: float, std: float | None) -> Density:
 
 
 def _with_std(chosen: Density, std: float) -> Density:
-    from dataclasses import replace
-
     if isinstance(std, bool) or not 0.0 <= std <= chosen.loose:
         raise UsageError(f"the density's deviation must be between 0 and {chosen.loose:g} kg/m³, got {std}")
     return replace(chosen, std=float(std))

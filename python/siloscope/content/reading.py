@@ -1,0 +1,268 @@
+"""From the core's numbers to the answer: capacity, level, volume, mass, remarks."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from siloscope import _core
+from siloscope.content import quality
+from siloscope.content.capacity import Datasheet, Strapping, missing
+from siloscope.content.density import Density
+from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge
+from siloscope.content.quality import QUALITY, Remark
+from siloscope.content.result import Content, Level, Parts
+from siloscope.content.surface_map import Shape, SurfaceMap
+from siloscope.errors import InputError, UsageError
+from siloscope.frame import Frame
+
+FEWEST = 3
+"""Fewer cells than this that seem to show content on an otherwise bare floor are no content."""
+
+DETECTABLE = 3.0
+"""A heap on the vertex lower than so many standard deviations of a cell's thickness goes unseen."""
+
+BOTTOMLESS = 100.0
+"""How far below the camera the floor is put while nobody knows it, m: everything seen then is content."""
+
+
+@dataclass(frozen=True, eq=False)
+class Request:
+    """What the caller wants to know, checked."""
+
+    data: Frame | ArrayLike
+    known: Knowledge
+    sheet: Datasheet
+    strapping: Strapping | None
+    density: Density | None
+    previous: Content | None
+    located: bool
+
+
+def content_of(
+    request: Request,
+    found: dict[str, Any],
+    core: _core.ContentSurface | None,
+    config: dict[str, Any],
+    times: dict[str, float],
+) -> Content:
+    """The core's numbers as the answer to a request: refused, or with everything that can be told."""
+    known = request.known
+    silo = lengths_for_core(known, request.sheet)
+    lacking = _lacking(known, found)
+    capacity, capacity_from = _capacity(request, silo, lacking)
+    coverage = _coverage(found)
+    said = tuple(quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
+    frame: dict[str, Any] = {
+        "source": source_of(request.data),
+        "timestamp": request.data.timestamp if isinstance(request.data, Frame) else None,
+        "config": {**_config(request), **config},
+        "timing_ms": times,
+        "lengths": known.lengths,
+        "missing": lacking,
+        "assumed": known.assumed,
+        "capacity": capacity,
+        "capacity_from": capacity_from,
+        "quality": said,
+    }
+    against = next((remark for remark in said if remark.refuses), None)
+    if against is not None:
+        return _refused(against, frame)
+    answer = _empty(request, found, silo) if _is_empty(found) else _filled(request, found, core, silo, lacking)
+    parts = None if lacking else Parts(*(found["std"][name] for name in Parts.__dataclass_fields__))
+    now = Content("ok", parts=parts, coverage=coverage, shape=Shape.of(found["shape"]), **answer, **frame)
+    return _moving(now, request.previous)
+
+
+def _is_empty(found: dict[str, Any]) -> bool:
+    """Nothing but bare floor is seen."""
+    return found["volume"] is None and found["kinds"][1] < FEWEST and found["bare"] is not None
+
+
+def _coverage(found: dict[str, Any]) -> float | None:
+    """Share of the surface that is seen; None where there is no surface."""
+    numbers = found["volume"]
+    if numbers is None:
+        return 1.0 if _is_empty(found) else None
+    return float(numbers["seen"] / max(numbers["area"], 1e-12))
+
+
+def _filled(
+    request: Request,
+    found: dict[str, Any],
+    core: _core.ContentSurface | None,
+    silo: tuple[float, ...],
+    lacking: tuple[str, ...],
+) -> dict[str, Any]:
+    """Heights, volume and mass under a surface."""
+    vertex = request.known.lengths.geometry.apex is not None
+    datum = silo[2] if vertex else float(found["volume"]["extremes"][1])
+    level = _level(found, core, datum)
+    surface = None if core is None else SurfaceMap(core, datum, silo[0])
+    volume, std = (None, None) if lacking else _volume(request, found, silo, level)
+    return {
+        "volume": volume,
+        "volume_std": std,
+        "level": level,
+        "height_datum": "cone-vertex" if vertex else "lowest-seen",
+        "surface": surface,
+        **_mass(request.density, volume, std, surface, silo),
+    }
+
+
+def _empty(request: Request, found: dict[str, Any], silo: tuple[float, ...]) -> dict[str, Any]:
+    """No content seen: none, up to the level that could hide on the vertex unseen."""
+    known = request.known
+    volume, std = None, None
+    if not missing(known.lengths.geometry):
+        radius, bottom, apex, *_ = silo
+        thin = DETECTABLE * math.hypot(WALL_STD, math.sqrt(max(float(known.covariance[6, 6]), 0.0)))
+        hidden = max(thin, found["bare"][0] * (apex - bottom) / radius)
+        volume, std = 0.0, _core.vessel_volume_below(silo, [apex - hidden])[0]
+    return {
+        "volume": volume,
+        "volume_std": std,
+        "level": Level(*[0.0] * 4),
+        "height_datum": "lowest-seen" if known.lengths.geometry.apex is None else "cone-vertex",
+        **_mass(request.density, volume, std, None, silo),
+    }
+
+
+def _lacking(known: Knowledge, found: dict[str, Any]) -> tuple[str, ...]:
+    """Lengths without which there is no volume; of a cone alone, the radius where the content may reach beyond it."""
+    if not known.lengths.cone_only:
+        return missing(known.lengths.geometry)
+    numbers, bare = found["volume"], found["bare"]
+    inside = numbers is None or (bare is not None and numbers["reach"] <= bare[1])
+    return () if inside else ("radius",)
+
+
+def _refused(remark: Remark, frame: dict[str, Any]) -> Content:
+    meaning, advice = QUALITY[remark.code]
+    message = f"{meaning[0].upper()}{meaning[1:]} ({remark.seen}); {advice}."
+    return Content("refused", remark.code, message, **frame)
+
+
+def _capacity(request: Request, silo: tuple[float, ...], lacking: tuple[str, ...]) -> tuple[float | None, str | None]:
+    if request.strapping is not None:
+        return request.strapping.capacity, "strapping"
+    if lacking or request.known.lengths.cone_only:
+        return None, None
+    source = "datasheet" if request.known.lengths.top_from == "datasheet" else "calibration"
+    return _core.vessel_volume_below(silo, [silo[3]])[0], source
+
+
+def _level(found: dict[str, Any], core: _core.ContentSurface | None, datum: float) -> Level:
+    numbers = found["volume"]
+    area = numbers["area"]
+    if area <= 0.0 or core is None:
+        return Level(*[0.0] * 4)
+    at_axis = float(core.z_at(np.zeros((1, 2)))[0])
+    low, high = numbers["extremes"]
+    at_wall = numbers["at_wall"]
+    return Level(
+        datum - numbers["moment"] / area,
+        datum - high,
+        datum - low,
+        max(datum - at_axis, 0.0),
+        None if at_wall is None else datum - at_wall,
+        found["std"]["total"] / area,
+    )
+
+
+def _volume(request: Request, found: dict[str, Any], silo: tuple[float, ...], level: Level) -> tuple[float, float]:
+    """Volume by the geometry; with a strapping table, the table's below the mean level and the rest by geometry."""
+    volume, std = float(found["volume"]["volume"]), float(found["std"]["total"])
+    if request.strapping is None or level.mean is None:
+        return volume, std
+    below = _core.vessel_volume_below(silo, [silo[2] - level.mean])[0]
+    return volume - below + request.strapping.volume(level.mean), std
+
+
+def _mass(
+    density: Density | None,
+    volume: float | None,
+    std: float | None,
+    surface: SurfaceMap | None,
+    silo: tuple[float, ...],
+) -> dict[str, Any]:
+    if density is None or volume is None or std is None:
+        return {"density": None if density is None else density.to_dict()}
+    mean = density.mean(_columns(surface, silo), silo[0])
+    own = density.std / density.loose * mean
+    return {
+        "mass": mean * volume,
+        "mass_std": math.hypot(mean * std, own * volume),
+        "density": {**density.to_dict(), "mean_kg_m3": mean},
+    }
+
+
+def _columns(surface: SurfaceMap | None, silo: tuple[float, ...]) -> NDArray[np.float64]:
+    """Heights of the content over the floor in the map's cells."""
+    if surface is None:
+        return np.zeros(0)
+    radius, bottom, apex, *_ = silo
+    across = np.hypot(surface.x[None, :], surface.y[:, None])
+    floor = np.minimum((apex - bottom) * across / radius, apex - bottom)
+    rise = np.where(surface.inside, surface.heights - floor, 0.0)
+    return np.asarray(rise[rise > 0.0])
+
+
+def _moving(now: Content, previous: Content | None) -> Content:
+    """With the remark that the content moved since the frame before, where it did."""
+    change = None if previous is None else now.change_since(previous)
+    if change is None or abs(change[0]) <= quality.MOVING * change[1]:
+        return now
+    return replace(
+        now, quality=(*now.quality, Remark("filling-in-progress", f"{change[0]:+.3f} m³ since the frame before"))
+    )
+
+
+def _config(request: Request) -> dict[str, Any]:
+    """The effective settings, written beside every result."""
+    known = request.known
+    std = np.sqrt(np.maximum(np.diag(known.covariance), 0.0))
+    values = (known.pose.r_x, known.pose.r_y, known.pose.t_x, known.pose.t_y)
+    return {
+        "located": request.located,
+        "pose": dict(zip(PARAMETERS[:4], values, strict=True)),
+        "std": dict(zip(PARAMETERS, std.tolist(), strict=True)),
+        "bias": dict(zip(PARAMETERS[7:], known.bias, strict=True)),
+        "datasheet": request.sheet.to_dict(),
+        "strapping": None if request.strapping is None else request.strapping.source,
+        "wall_std": WALL_STD,
+    }
+
+
+def source_of(data: Frame | ArrayLike) -> str:
+    """Name of the frame."""
+    return data.source if isinstance(data, Frame) else "frame"
+
+
+def lengths_for_core(known: Knowledge, sheet: Datasheet) -> tuple[float, ...]:
+    """Lengths as the core takes them; a floor that nobody knows is put out of sight."""
+    geometry = known.lengths.geometry
+    if geometry.radius is None:
+        raise InputError(
+            "the calibration has not seen the cylinder, so the silo's radius is not known; give --diameter, or "
+            "calibrate with frames of a lower level"
+        )
+    bottom, apex = geometry.cylinder_bottom, geometry.apex
+    if bottom is None or apex is None:
+        bottom = apex = BOTTOMLESS
+    if sheet.outlet_diameter >= 2.0 * geometry.radius:
+        raise UsageError(
+            f"an outlet of {sheet.outlet_diameter:g} m does not fit a silo of {2.0 * geometry.radius:.3f} m; "
+            "give --outlet-diameter in metres"
+        )
+    if known.lengths.top >= apex:
+        raise UsageError(
+            f"the upper edge at {known.lengths.top:g} m below the camera lies under the cone's vertex at {apex:.3f} m; "
+            "--top is negative above the camera"
+        )
+    outlet = sheet.outlet_diameter / 2.0
+    return geometry.radius, bottom, apex, known.lengths.top, outlet, sheet.outlet_length, *known.ovality
