@@ -15,9 +15,13 @@ import siloscope
 from silos import known, measured, noisy, percent, scene
 from siloscope.content import QUALITY
 from siloscope.errors import InputError, UsageError
-from siloscope.scene import ASTRA_S, PERFECT, Defects, Feed, Silo
+from siloscope.paper.scenarios import random_scene
+from siloscope.scene import ASTRA_S, PERFECT, Defects, Feed, Silo, defects
 
 PLACES = [(0.0, 0.0), (0.4, 0.2), (-0.8, 0.3), (0.2, -0.9)]
+
+WALLED = replace(random_scene(7000, Feed("gaussian", 0.3), sensor=ASTRA_S), camera=silos.SMALL)
+"""A silo of which the camera sees much wall."""
 
 
 class TestLaws:
@@ -291,6 +295,24 @@ class TestClutter:
         content, frame = measured(scene(Feed("flat", 0.5), silo=silos.STOUT, defects=stuck))
         assert content.ok, content.message
         assert abs(percent(content, frame)) < 1.0
+
+    def test_feed_on_the_wall_is_no_move_of_the_camera(self) -> None:
+        made = replace(WALLED, defects=defects("film", 7000))
+        content, frame = measured(made)
+        assert [remark.code for remark in content.quality] == ["stuck-feed"]
+        assert abs(percent(content, frame)) < 0.05
+
+    def test_a_small_move_of_the_camera_widens_the_deviation_and_a_larger_one_refuses(self) -> None:
+        def seen(move: float) -> siloscope.Content:
+            pose = replace(WALLED.pose, t_x=WALLED.pose.t_x + move, r_y=WALLED.pose.r_y + move / 3.0)
+            return siloscope.measure(replace(WALLED, pose=pose).render().frame(), known(WALLED, 1e-4))
+
+        still, little, much = (seen(move) for move in (0.0, 0.003, 0.006))
+        assert still.quality == ()
+        assert little.ok
+        assert little.has("camera-moved")
+        assert (little.volume_std or 0.0) > (still.volume_std or 0.0)
+        assert much.reason == "camera-moved"
 
     def test_a_ladder_and_cables_do_not_count_as_content(self) -> None:
         bare = scene(Feed("gaussian", 0.4), place=(-0.3, 0.2))

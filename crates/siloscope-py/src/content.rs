@@ -146,7 +146,7 @@ fn report<'py>(py: Python<'py>, content: &Content) -> PyResult<Bound<'py, PyDict
     out.set_item("tally", (t.returns, t.wall, t.outside, t.above, t.coherent))?;
     let s = &content.sight;
     out.set_item("sight", (s.measured, s.blind, s.near))?;
-    out.set_item("shift", content.shift.map(|s| (s.change, s.std, s.rms, s.returns)))?;
+    out.set_item("shift", content.shift.map(|s| (s.change, s.std, s.rms, s.left)))?;
     Ok(out)
 }
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 QUALITY: dict[str, tuple[str, str]] = {
     "too-little-seen": (
         "too little of the content's surface is seen to tell how much there is",
@@ -74,8 +76,10 @@ OUTSIDE = 0.03
 """Share of the returns outside the silo's wall that no clean view has."""
 SUNKEN = 0.1
 """Share of the seen cells below the floor with which calibration and frame do not belong together."""
-SHIFTED = 5.0
+SHIFTED = 3.0
 """Standard deviations by which the wall must have moved."""
+EXPLAINED = 0.5
+"""Share of the wall's mean square distance that the move must take away; feed on the wall looks like a move, too."""
 MATTERS = 3.0
 """A move of the camera refuses the reading where it changes the volume by so many standard deviations."""
 MOVING = 4.0
@@ -183,12 +187,16 @@ def _moved(found: dict[str, Any]) -> list[Remark]:
         return [Remark("camera-moved", f"{100 * share:.0f} % of the returns lie outside the wall", True)]
     if found["shift"] is None:
         return []
-    change, std, _, _ = found["shift"]
+    change, std, before, after = found["shift"]
     sigmas = max(abs(c) / s for c, s in zip(change, std, strict=True))
-    if sigmas < SHIFTED:
+    if sigmas < SHIFTED or after**2 > (1.0 - EXPLAINED) * before**2:
         return []
     moved = 1e3 * (change[2] ** 2 + change[3] ** 2) ** 0.5
     turned = 1e3 * (change[0] ** 2 + change[1] ** 2) ** 0.5
-    matter = abs(sum(c * d for c, d in zip(change, found["derivatives"], strict=False)))
-    refuses = matter > MATTERS * max(found["std"]["total"], 1e-9)
+    refuses = move_matters(found) > MATTERS * max(found["std"]["total"], 1e-9)
     return [Remark("camera-moved", f"by {moved:.1f} mm and {turned:.2f} mrad, {sigmas:.0f} deviations", refuses)]
+
+
+def move_matters(found: dict[str, Any]) -> float:
+    """By how much the wall's apparent move would change the volume, m³."""
+    return abs(float(np.dot(found["shift"][0], found["derivatives"][:4])))

@@ -72,10 +72,18 @@ def content_of(
     against = next((remark for remark in said if remark.refuses), None)
     if against is not None:
         return _refused(against, frame)
+    if any(remark.code == "camera-moved" for remark in said):
+        found = {**found, "std": _with_move(found)}
     answer = _empty(request, found, silo) if _is_empty(found) else _filled(request, found, core, silo, lacking)
     parts = None if lacking else Parts(*(found["std"][name] for name in Parts.__dataclass_fields__))
     now = Content("ok", parts=parts, coverage=coverage, shape=Shape.of(found["shape"]), **answer, **frame)
     return _moving(now, request.previous)
+
+
+def _with_move(found: dict[str, Any]) -> dict[str, float]:
+    """The volume's deviations when the camera seems to have moved a little: the move counts as the pose's error."""
+    matter = quality.move_matters(found)
+    return {**found["std"], **{name: math.hypot(found["std"][name], matter) for name in ("pose", "total")}}
 
 
 def _is_empty(found: dict[str, Any]) -> bool:

@@ -16,6 +16,8 @@ pub struct Shift {
     pub std: [f64; 4],
     /// Root of the mean square distance of the wall's returns from where the calibration has the wall, metres.
     pub rms: f64,
+    /// The same when the change is taken out.
+    pub left: f64,
     /// Returns used.
     pub returns: f64,
 }
@@ -68,11 +70,15 @@ pub fn shift(
         change = normal.cholesky()?.solve(&right);
     }
     let own = normal.try_inverse()?;
-    let square = residuals.iter().map(|r| r.distance * r.distance).sum::<f64>();
+    let rms = |change: &Vector4<f64>| {
+        let square = residuals.iter().map(|r| (r.distance + r.by_pose.dot(change)).powi(2)).sum::<f64>();
+        (square / residuals.len() as f64).sqrt()
+    };
     Some(Shift {
         change: change.into(),
         std: POSE.map(|i| (own[(i, i)] + covariance[(i, i)]).max(0.0).sqrt()).collect::<Vec<_>>().try_into().ok()?,
-        rms: (square / residuals.len() as f64).sqrt(),
+        rms: rms(&Vector4::zeros()),
+        left: rms(&change),
         returns: residuals.len() as f64,
     })
 }
