@@ -134,8 +134,8 @@ def fuse(stack: Stack, earlier: Sums | None = None) -> Fused:
     centre = majority(stack, everyone, _starts(stack), base)
     weights, excess = np.ones(stack.count), 1.0
     for _ in range(30):
-        squared = stack.distances(centre)[0]
-        excess = _excess(squared, stack.dof)
+        squared, counts = stack.distances(centre)[0], weights > 0.0
+        excess = _excess(squared[counts], stack.dof[counts])
         new = agreement(deviation(squared / excess, stack.dof))
         centre = solve(stack, new[None], base)
         settled = np.allclose(new, weights, atol=1e-9)

@@ -8,8 +8,9 @@ use crate::start::{Oriented, Start, View, other_part, starts, steeper_cone};
 use crate::surface::{Part, PlacedSurface};
 use crate::verdict::{WallEvidence, wall_evidence};
 
-/// A cone that rises less than 36° could as well be feed lying at its angle of repose, unless feed lies in it.
-pub(crate) const FEED_SLOPE: f64 = 1.376;
+/// A cone that rises less than 37.4° could as well be feed, unless feed lies in it: angles of repose go up to 36°, and
+/// a fit to feed with some wall in it may come out a little steeper.
+pub(crate) const FEED_SLOPE: f64 = 1.31;
 
 /// A fit on patches that stands up to the evidence.
 #[derive(Debug, Clone)]
@@ -164,12 +165,16 @@ fn apex_is_covered(problem: &Problem, fit: &Fit) -> bool {
     near >= 4 && covered * 10 >= near * 7
 }
 
+/// Least share of an image that a body fills that is looked at from outside.
+const BODY_SHARE: f64 = 0.2;
+
 /// What has to hold on a wall of revolution.
 ///
 /// Tiles of an image measure it to a hundredth; the normals of a cloud come from few points, and both bend and turn less
 /// than their surface.
 fn judge(e: &WallEvidence, inside: bool, cloud: bool) -> Result<(), Refusal> {
-    if e.patches < 20 || e.arc < 0.5 {
+    let too_small = !inside && !cloud && e.share < BODY_SHARE; // a pipe or an auger in view, not what one looks at
+    if e.patches < 20 || e.arc < 0.5 || too_small {
         return Err(Refusal::NoWall);
     }
     let [turn, bend] = match (cloud, inside) {

@@ -1,7 +1,7 @@
 //! How sure the fit is: the noise's covariance, widened by what the residuals say about the model, and the scale.
 
 use crate::polish::TileEquation;
-use crate::refine::{Equation, Fit, Problem, System, tukey};
+use crate::refine::{Equation, Fit, Prior, Problem, System, tukey};
 use crate::surface::{Information, PARAMETERS, Parameters};
 
 /// The model's covariance, widened in those directions in which groups of tiles disagree more than it says.
@@ -66,20 +66,21 @@ fn chance(samples: usize) -> f64 {
     (1.0 + (FREE / samples.max(1) as f64).sqrt()).powi(-2)
 }
 
-/// The share of the wall's relief (corrugation, rust) in the covariance.
+/// The share of the wall's relief (corrugation, rust) in the covariance, and of its `form` beside that, metres.
 ///
 /// Within a tile the pixels scatter by the sensor's noise and by the wall's relief across it. A grazing ray meets the
 /// relief's crests and not its troughs, so the mean wall is seen shifted inwards. That shift follows the incidence over
 /// the whole frame, and beside that each block of tiles sees its own part of the pattern: neither averages out as noise.
-pub fn relief_uncertainty(problem: &Problem, fit: &Fit, tiles: &[TileEquation]) -> Information {
+pub fn relief_uncertainty(problem: &Problem, fit: &Fit, tiles: &[TileEquation], form: f64) -> Information {
     let relief = relief(tiles);
-    if relief == 0.0 {
+    let off = (RELIEF_SHARE * relief).hypot(form);
+    if off == 0.0 {
         return Information::zeros();
     }
     let (mut pull, mut system) = (Parameters::zeros(), System::with_prior(problem.prior, fit));
     for TileEquation { equation: e, .. } in tiles {
         let weight = tukey(e.residual * e.residual / e.variance);
-        let across = RELIEF_SHARE * relief / e.cosine;
+        let across = off / e.cosine;
         let blocked = Equation { variance: across * across * f64::from(BLOCK * BLOCK), ..*e };
         system.add(&blocked, weight);
         pull += e.jacobian * (relief * (1.0 - e.cosine) / e.cosine * weight / blocked.variance);
@@ -87,6 +88,39 @@ pub fn relief_uncertainty(problem: &Problem, fit: &Fit, tiles: &[TileEquation]) 
     system
         .covariance(fit)
         .map_or(Information::zeros(), |(spread, _)| spread + spread * pull * (spread * pull).transpose())
+}
+
+/// Whether the residuals show that the silo is oval: the two parts of its ovality against their covariance.
+pub fn shows_ovality(problem: &Problem, fit: &Fit, tiles: &mut [TileEquation], std: f64) -> bool {
+    let prior = Prior { ovality_std: std, ..problem.prior.clone() };
+    let mut system = System::with_prior(&prior, fit);
+    for tile in tiles {
+        tile.allow(fit.misfit);
+        let e = &tile.equation;
+        system.add(e, tukey(e.residual * e.residual / e.variance));
+    }
+    let (Some(step), Some((covariance, _))) = (system.solve(fit), system.covariance(fit)) else { return false };
+    let (found, spread) = (step.fixed_rows::<2>(OVALITY), covariance.fixed_view::<2, 2>(OVALITY, OVALITY));
+    let squared = spread.try_inverse().map_or(0.0, |inverse| found.dot(&(inverse * found)));
+    squared > SURE
+}
+
+/// First of the ovality's two parameters.
+const OVALITY: usize = 10;
+/// Chi-square of two degrees of freedom that chance passes once in 20,000 frames.
+const SURE: f64 = 20.0;
+
+/// The share of an ovality that was not estimated: where a frame can't tell it, it may be as large as silos have it.
+///
+/// The answer goes with it as the free parameters' equations say, and what the frame tells of it limits it.
+pub fn ovality_uncertainty(model: &Information, system: &System, std: f64) -> Information {
+    let mut information = system.information;
+    information.fill_upper_triangle_with_lower_triangle();
+    let coupled = information.fixed_columns::<2>(OVALITY);
+    let sensitivity = model * coupled;
+    let own = information.fixed_view::<2, 2>(OVALITY, OVALITY) - coupled.transpose() * sensitivity;
+    let left = (own + nalgebra::Matrix2::identity() / (std * std)).try_inverse();
+    left.map_or(Information::zeros(), |left| sensitivity * left * sensitivity.transpose())
 }
 
 /// How far a block's mean lies off by the relief, as a share of it.

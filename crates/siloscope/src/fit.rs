@@ -4,7 +4,7 @@ use crate::Result;
 use crate::Vec3;
 use crate::cloud::cloud_patches;
 use crate::coarse::{Settled, coarse_fit, drop_bare_parts};
-use crate::covariance::{relief_uncertainty, scale_uncertainty, widened};
+use crate::covariance::{ovality_uncertainty, relief_uncertainty, scale_uncertainty, shows_ovality, widened};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
 use crate::refine::{Fit, Prior, Problem, tukey};
@@ -51,10 +51,21 @@ pub struct SurfaceFit {
     pub timing: Vec<(&'static str, f64)>,
 }
 
-/// Misfit, as a share of the radius, from which on the silo may be oval.
-const OVAL_MISFIT: f64 = 1e-3;
 /// Standard deviation of each part of a real silo's ovality.
 const OVALITY_STD: f64 = 0.005;
+
+/// How far a wall that shows ovality, and so is no ideal one, lies off its mean over a block of tiles, metres.
+const WALL_FORM: f64 = 2.5e-4;
+/// The same as a multiple of the misfit that the tiles show: what stuck feed and dents do to neighbouring tiles alike.
+const MISFIT_FORM: f64 = 2.0;
+
+/// Misfit that chance alone shows on a smooth wall, metres.
+const CHANCE_MISFIT: f64 = 2e-4;
+
+/// How far the wall may lie off its mean over a block of tiles, metres.
+fn form(fit: &Fit, oval: bool) -> f64 {
+    MISFIT_FORM * (fit.misfit - CHANCE_MISFIT).max(0.0) + if oval { WALL_FORM } else { 0.0 }
+}
 
 /// Fits the wall to a depth image.
 pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
@@ -77,15 +88,16 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
         problem.noise = polish(&problem, image, &mut fit, &wall, reach, know.error.noise);
     }
     let noise = problem.noise;
-    if fit.misfit > OVAL_MISFIT * fit.surface.size() {
+    let mut equations = pixel_equations(&problem, image, &fit, &wall, &ALL);
+    if shows_ovality(&problem, &fit, &mut equations, OVALITY_STD) {
         prior.ovality_std = OVALITY_STD;
+        let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
         for reach in [3.0, 2.0] {
-            let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
             polish(&problem, image, &mut fit, &wall, reach, Some(noise));
         }
+        equations = pixel_equations(&problem, image, &fit, &wall, &ALL);
     }
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-    let mut equations = pixel_equations(&problem, image, &fit, &wall, &ALL);
     clock.lap("pixels");
     let mut result =
         finish(&problem, fit, &mut equations, evidence, know.error.noise.is_some()).ok_or(Refusal::PoorlyDetermined)?;
@@ -198,7 +210,10 @@ fn finish(
     let (model, free) = system.covariance(&fit)?;
     let mut covariance = widened(problem, &model, &system, (tiles, &pulls));
     if noise_is_known {
-        covariance += relief_uncertainty(problem, &fit, tiles);
+        covariance += relief_uncertainty(problem, &fit, tiles, form(&fit, free[10]));
+    }
+    if !problem.patches.cloud && !free[10] {
+        covariance += ovality_uncertainty(&model, &system, OVALITY_STD);
     }
     let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);

@@ -168,7 +168,7 @@ impl TileEquation {
     }
 
     /// Puts a misfit of the wall into the variance.
-    fn allow(&mut self, misfit: f64) {
+    pub fn allow(&mut self, misfit: f64) {
         let along = misfit / self.equation.cosine;
         self.equation.variance = self.noise + along * along;
     }
