@@ -40,7 +40,7 @@ def write_track(directory: Path, found: Track, parquet: bool = False) -> list[Pa
 
 def trend(found: Track) -> Any:
     """The picture of the story: the volume, or the level where nobody knows the floor."""
-    from siloscope.plots.content import trend as drawn
+    from siloscope.plots.trend import trend as drawn
 
     shown = [r for r in found.readings if r.status != "unreadable"]
     place, label = _axis(shown)

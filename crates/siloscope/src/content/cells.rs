@@ -1,12 +1,11 @@
 //! Returns gathered into cells: the wall taken away, each cell's surface told from dust by its median.
 
+use super::bound::{Bound, Side};
 use super::doubt::Lever;
 use super::grid::Grid;
 use super::returns::{Line, Returns};
 use crate::sensor::NoiseLaw;
 
-/// Returns within so many standard deviations of the wall belong to the wall.
-const WALL_SIGMAS: f64 = 4.0;
 /// Returns farther than so many robust standard deviations from their cell's median are clutter.
 const CLUTTER_SIGMAS: f32 = 4.0;
 /// Returns of which the medians are taken; more add time, not certainty.
@@ -16,32 +15,9 @@ const FEWEST: usize = 3;
 /// Two floating returns in a row whose depths differ by less than this share show a thing, not dust.
 const COHERENT: f32 = 0.02;
 
-/// The cylinder that bounds the surface, and how well it is known.
-#[derive(Debug, Clone)]
-pub struct Bound {
-    radius: f32,
-    top: f32,
-    camera: [f32; 2],
-    /// For each step of depth d, `2 k σ_d / d` and `2 k R σ_R`.
-    margins: Vec<[f32; 2]>,
-    /// For each step of depth, the squared radius within which no return up to there can belong to the wall.
-    inside: Vec<f32>,
-}
-
-/// Step of the margins' table, metres.
-const STEP: f32 = 0.02;
-
 /// 2²³: a number of single precision that is added to it is rounded to whole numbers, which stand in its lowest bits.
 /// Conversions would do the same, but not for four returns at a time.
 const WHOLE: f32 = 8_388_608.0;
-
-/// On which side of the wall a return lies.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Side {
-    Inside,
-    Wall,
-    Outside,
-}
 
 /// Cells and squared distances from the axis of one line's returns.
 #[derive(Debug, Default)]
@@ -67,89 +43,6 @@ impl Places {
     }
 }
 
-impl Bound {
-    /// A cylinder whose distance from a point is known to `variance[0] + variance[1] depth²`.
-    ///
-    /// `reach` is the largest depth of interest; nothing above `top` is looked at; `camera` is where it hangs.
-    pub fn new(radius: f64, variance: [f64; 2], noise: &NoiseLaw, reach: f64, top: f64, camera: [f64; 2]) -> Self {
-        let steps = (reach.clamp(0.0, 1e3) / f64::from(STEP)) as usize + 2;
-        let margin = |i: usize| {
-            let d = (i as f64 + 0.5) * f64::from(STEP);
-            let lateral = (variance[0] + variance[1] * d * d).sqrt();
-            [(2.0 * WALL_SIGMAS * noise.sigma(d) / d) as f32, (2.0 * WALL_SIGMAS * radius * lateral) as f32]
-        };
-        let margins: Vec<[f32; 2]> = (0..steps).map(margin).collect();
-        // at the wall |p · ray| d is at most R (R + |camera|), and at most 2 R d as no ray is flatter than 2 : 1
-        let (across, mut widest) = (radius + camera[0].hypot(camera[1]), 0.0f64);
-        let inside = margins.iter().enumerate().map(|(i, m)| {
-            let along = radius * across.min(2.0 * (i as f64 + 1.0) * f64::from(STEP));
-            widest = widest.max(f64::from(m[0]) * along + f64::from(m[1]));
-            (radius * radius - widest).max(0.0) as f32
-        });
-        Self {
-            radius: radius as f32,
-            top: top as f32,
-            camera: camera.map(|c| c as f32),
-            inside: inside.collect(),
-            margins,
-        }
-    }
-
-    /// Squared radius within which no return of a line can belong to the wall.
-    fn inside(&self, line: &Line) -> f32 {
-        self.inside.get(self.step(farthest(&line.depth))).copied().unwrap_or(0.0)
-    }
-
-    /// Whether a return is so far inside that nothing else needs to be looked at.
-    #[inline]
-    fn surely_inside(&self, inside: f32, square: f32, z: f32) -> bool {
-        square < inside && z >= self.top
-    }
-
-    /// Tells a return on the wall from one inside; |Δr| ≤ k σ is tested as |r² − R²| ≤ 2 k (|p·ray| σ_d + R σ_R).
-    fn side(&self, [x, y, z]: [f32; 3], depth: f32) -> Side {
-        let [by_depth, by_radius] = self.margin(depth);
-        let along = (x * (x - self.camera[0]) + y * (y - self.camera[1])).abs();
-        let margin = by_depth * along + by_radius;
-        let excess = x * x + y * y - self.radius * self.radius;
-        let beyond = excess > margin || excess.is_nan();
-        if z < self.top || beyond {
-            Side::Outside
-        } else if excess > -margin {
-            Side::Wall
-        } else {
-            Side::Inside
-        }
-    }
-
-    /// Whether the wall takes no return from a cell with this middle and side.
-    pub fn clears(&self, [x, y]: [f64; 2], side: f64, cell: &Cell) -> bool {
-        let far = x.hypot(y) + 0.5 * f64::sqrt(2.0) * side;
-        let [px, py, pz] = cell.mean.map(|m| m as f32);
-        let out = far as f32 / px.hypot(py).max(1e-6);
-        !cell.seen() && far < f64::from(self.radius)
-            || cell.seen() && self.side([px * out, py * out, pz], pz.max(STEP)) == Side::Inside
-    }
-
-    #[inline]
-    fn margin(&self, depth: f32) -> [f32; 2] {
-        self.margins.get(self.step(depth)).copied().unwrap_or([0.0; 2])
-    }
-
-    #[inline]
-    fn step(&self, depth: f32) -> usize {
-        ((depth * (1.0 / STEP)) as usize).min(self.margins.len().saturating_sub(1))
-    }
-}
-
-/// Largest depth, four at a time.
-fn farthest(depth: &[f32]) -> f32 {
-    let (chunks, rest) = depth.as_chunks::<4>();
-    let most = |a: f32, b: f32| if b > a { b } else { a };
-    let four = chunks.iter().fold([0.0; 4], |m, d| [0, 1, 2, 3].map(|k| most(m[k], d[k])));
-    four.into_iter().chain(rest.iter().copied()).fold(0.0, most)
-}
-
 /// What the returns over one cell say.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Cell {
@@ -159,10 +52,6 @@ pub struct Cell {
     pub mean: [f64; 3],
     /// Variance of their mean height by the sensor's noise.
     pub variance: f64,
-    /// Returns above what agrees.
-    pub above: f64,
-    /// Returns below what agrees.
-    pub below: f64,
 }
 
 impl Cell {
@@ -270,8 +159,8 @@ impl Gathering<'_> {
             }
             if run.window.holds(z) {
                 run.sum.iter_mut().zip([x, y, z, 1.0]).for_each(|(sum, part)| *sum += part);
-            } else {
-                self.stray(cell, z < run.window.low, depth);
+            } else if z < run.window.low && run.window.known() {
+                self.floats(depth);
             }
         }
         self.flush(&run);
@@ -284,15 +173,9 @@ impl Gathering<'_> {
         self.windows.get(cell as usize).copied().unwrap_or(CLOSED)
     }
 
-    /// A return above or below the surface.
+    /// A return that floats above the surface.
     #[cold]
-    fn stray(&mut self, cell: u32, above: bool, depth: f32) {
-        let Some(cell) = self.cells.get_mut(cell as usize) else { return };
-        if !above {
-            cell.below += 1.0;
-            return;
-        }
-        cell.above += 1.0;
+    fn floats(&mut self, depth: f32) {
         self.tally.above += 1.0;
         self.tally.coherent += f64::from(u8::from((depth - self.floating).abs() < COHERENT * depth));
         self.floating = depth;
@@ -358,6 +241,11 @@ fn by_cell(samples: &[Sample], cells: usize) -> Vec<Sample> {
 }
 
 impl Window {
+    /// Whether anything agrees with it.
+    fn known(&self) -> bool {
+        self.low <= self.high
+    }
+
     #[inline]
     fn holds(&self, z: f32) -> bool {
         z >= self.low && z <= self.high

@@ -1,6 +1,7 @@
 //! The surface of a bare point cloud with a given vertical, where no silo is known.
 
-use super::cells::{Bound, Cell, gather};
+use super::bound::Bound;
+use super::cells::{Cell, gather};
 use super::doubt::Lever;
 use super::fit::{Surface, fit, sketch};
 use super::grid::Grid;

@@ -1,6 +1,7 @@
 //! From a frame and a silo to its content: the page to read first.
 
-use super::cells::{Bound, Tally, gather};
+use super::bound::Bound;
+use super::cells::{Tally, gather};
 use super::classify::{Classified, Floor, Thing, classify};
 use super::doubt::{Covariance, DEPTH, GEOMETRY, Lever, POSE, Parameters, deviation, share};
 use super::drift::settle;

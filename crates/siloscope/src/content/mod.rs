@@ -1,6 +1,7 @@
 //! What is in the silo: the surface of the content and the volume under it.
 
 pub mod basis;
+pub mod bound;
 pub mod cells;
 pub mod classify;
 pub mod cloud;

@@ -1,6 +1,6 @@
 //! Whether the wall still lies where the calibration has it.
 
-use super::doubt::{Covariance, Lever, POSE};
+use super::doubt::{Covariance, DEPTH, Lever, POSE};
 use super::fit::Surface;
 use super::returns::Returns;
 use super::vessel::Vessel;
@@ -18,8 +18,6 @@ pub struct Shift {
     pub rms: f64,
     /// The same when the change is taken out.
     pub left: f64,
-    /// Returns used.
-    pub returns: f64,
 }
 
 /// Returns looked at.
@@ -43,6 +41,13 @@ struct Residual {
     sigma: f64,
 }
 
+impl Residual {
+    /// The distance when the pose has changed.
+    fn after(&self, change: &Vector4<f64>) -> f64 {
+        self.distance + self.by_pose.dot(change)
+    }
+}
+
 /// Fits the pose's change to the returns near the cylinder's wall; None where they are too few to tell.
 pub fn shift(
     returns: &Returns<'_>,
@@ -53,34 +58,39 @@ pub fn shift(
     surface: Option<&Surface>,
 ) -> Option<Shift> {
     let residuals = near_wall(returns, vessel, lever, noise, surface);
-    let mut change = Vector4::zeros();
-    let mut normal = Matrix4::zeros();
     if residuals.len() < FEWEST {
         return None;
     }
+    let mut change = Vector4::zeros();
+    let mut normal = Matrix4::zeros();
     for _ in 0..ROUNDS {
-        let mut right = Vector4::zeros();
-        normal = Matrix4::identity() * 1e-6;
-        for r in &residuals {
-            let left = (r.distance + r.by_pose.dot(&change)) / r.sigma;
-            let weight = (1.0 - (left / TUKEY).powi(2)).max(0.0).powi(2) / (r.sigma * r.sigma);
-            normal += weight * r.by_pose * r.by_pose.transpose();
-            right -= weight * r.by_pose * r.distance;
-        }
+        let right;
+        (normal, right) = normal_equations(&residuals, &change);
         change = normal.cholesky()?.solve(&right);
     }
     let own = normal.try_inverse()?;
-    let rms = |change: &Vector4<f64>| {
-        let square = residuals.iter().map(|r| (r.distance + r.by_pose.dot(change)).powi(2)).sum::<f64>();
-        (square / residuals.len() as f64).sqrt()
-    };
     Some(Shift {
         change: change.into(),
         std: POSE.map(|i| (own[(i, i)] + covariance[(i, i)]).max(0.0).sqrt()).collect::<Vec<_>>().try_into().ok()?,
-        rms: rms(&Vector4::zeros()),
-        left: rms(&change),
-        returns: residuals.len() as f64,
+        rms: rms(&residuals, &Vector4::zeros()),
+        left: rms(&residuals, &change),
     })
+}
+
+/// Sums of the least squares, with Tukey's weights by what the change found so far leaves.
+fn normal_equations(residuals: &[Residual], change: &Vector4<f64>) -> (Matrix4<f64>, Vector4<f64>) {
+    let (mut normal, mut right) = (Matrix4::identity() * 1e-6, Vector4::zeros());
+    for r in residuals {
+        let left = r.after(change) / r.sigma;
+        let weight = (1.0 - (left / TUKEY).powi(2)).max(0.0).powi(2) / (r.sigma * r.sigma);
+        normal += weight * r.by_pose * r.by_pose.transpose();
+        right -= weight * r.by_pose * r.distance;
+    }
+    (normal, right)
+}
+
+fn rms(residuals: &[Residual], change: &Vector4<f64>) -> f64 {
+    (residuals.iter().map(|r| r.after(change).powi(2)).sum::<f64>() / residuals.len() as f64).sqrt()
 }
 
 fn near_wall(
@@ -91,27 +101,34 @@ fn near_wall(
     surface: Option<&Surface>,
 ) -> Vec<Residual> {
     let stride = (returns.len() as f64 / SAMPLED).sqrt().round().max(1.0) as usize;
-    let gate = GATE * vessel.radius;
     let mut residuals = Vec::new();
     returns.visit(stride, |line| {
         for i in (0..line.len()).filter(|&i| line.depth[i] > 0.0) {
             let point = [line.x[i], line.y[i], line.z[i]].map(f64::from);
-            let radius = point[0].hypot(point[1]);
-            let distance = radius - vessel.radius;
-            let on_cylinder = point[2] > vessel.top && point[2] < vessel.cylinder_bottom - gate;
-            let content = |s: &Surface| s.height(point[0], point[1]) - point[2] < CLEARANCE * vessel.radius;
-            if distance.abs() < gate && on_cylinder && !surface.is_some_and(content) {
-                let out = [point[0] / radius, point[1] / radius];
-                let shifts = lever.shifts(point);
-                let along = |k: usize| out[0] * shifts[k][0] + out[1] * shifts[k][1];
-                let grazing = along(7).abs() * noise.sigma(f64::from(line.depth[i]));
-                residuals.push(Residual {
-                    distance,
-                    by_pose: Vector4::new(along(0), along(1), along(2), along(3)),
-                    sigma: grazing.hypot(UNEVEN),
-                });
+            if on_cylinder(vessel, surface, point) {
+                residuals.push(residual(vessel, lever, noise, point, f64::from(line.depth[i])));
             }
         }
     });
     residuals
+}
+
+/// Whether a return may be the cylinder's wall: near it, clear of the cone and of the content.
+fn on_cylinder(vessel: &Vessel, surface: Option<&Surface>, [x, y, z]: [f64; 3]) -> bool {
+    let gate = GATE * vessel.radius;
+    let near = (x.hypot(y) - vessel.radius).abs() < gate && z > vessel.top && z < vessel.cylinder_bottom - gate;
+    near && surface.is_none_or(|s| s.height(x, y) - z >= CLEARANCE * vessel.radius)
+}
+
+fn residual(vessel: &Vessel, lever: &Lever, noise: &NoiseLaw, point: [f64; 3], depth: f64) -> Residual {
+    let radius = point[0].hypot(point[1]);
+    let out = [point[0] / radius, point[1] / radius];
+    let shifts = lever.shifts(point);
+    let along = |k: usize| out[0] * shifts[k][0] + out[1] * shifts[k][1];
+    let grazing = along(DEPTH.start).abs() * noise.sigma(depth);
+    Residual {
+        distance: radius - vessel.radius,
+        by_pose: Vector4::new(along(0), along(1), along(2), along(3)),
+        sigma: grazing.hypot(UNEVEN),
+    }
 }
