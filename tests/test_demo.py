@@ -49,9 +49,17 @@ def test_full_silo_is_refused_and_empty_one_is_found_to_a_millimetre(done: tuple
     assert last["pc_average_distance_m"] < 1e-3
 
 
+def test_the_content_of_every_frame_is_measured(done: tuple[Path, dict]) -> None:
+    truth = [frame["truth"]["content"]["volume"] for frame in done[1]["frames"]]
+    found = [content["volume_m3"] for content in done[1]["contents"]]
+    capacity = done[1]["contents"][-1]["capacity_m3"]
+    for volume, true in zip(found[1:], truth[1:], strict=True):
+        assert volume == pytest.approx(true, abs=5e-3 * capacity)
+
+
 def test_page_is_whole_and_alone(done: tuple[Path, dict]) -> None:
     html = (done[0] / "report.html").read_text("utf-8")
-    assert html.count("data:image/png;base64,") == 7
+    assert html.count("data:image/png;base64,") == 9
     assert len(html) < 5_000_000
     words = re.sub(r"data:image/png;base64,[A-Za-z0-9+/=]+", "", html)
     assert "http" not in words

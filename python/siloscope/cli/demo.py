@@ -11,7 +11,8 @@ from siloscope.calibration import Calibration
 from siloscope.cli import options
 from siloscope.cli.outcome import print_json, writing
 from siloscope.cli.progress import say, track
-from siloscope.demo import Step, fused, locate_all, scenes, write_frame
+from siloscope.content import Content
+from siloscope.demo import Step, fused, locate_all, measured, scenes, write_frame
 
 
 def demo(
@@ -19,7 +20,7 @@ def demo(
     steps: Annotated[int, typer.Option(min=1, max=1000, help="Frames of the discharge.")] = 24,
     as_json: options.AsJson = False,
 ) -> None:
-    """Simulate a silo that is emptied, find its axis in every frame, and write a report page.
+    """Simulate a silo that is emptied, find its axis in every frame, measure its content, and write a report page.
 
     [bold]Example:[/bold] siloscope demo --out demo
 
@@ -30,28 +31,30 @@ def demo(
     done = list(track(locate_all(scenes(steps)), "locating", total=steps))
     say("drawing the report")
     calibration = fused(done)
-    report = _write(done, calibration, out)
+    contents = list(track(measured(done, calibration), "measuring", total=steps))
+    report = _write(done, calibration, contents, out)
     found = sum(step.estimates["surface"].ok for step in done)
     if as_json:
-        print_json(_document(done, calibration, report))
+        print_json(_document(done, calibration, contents, report))
     else:
         typer.echo(f"{found} of {steps} frames answered. The report: {report}")
 
 
-def _write(done: list[Step], calibration: Calibration, out: Path) -> Path:
+def _write(done: list[Step], calibration: Calibration, contents: list[Content], out: Path) -> Path:
     from siloscope.demo.page import page
 
-    finished = page(done, calibration)
+    finished = page(done, calibration, contents)
     with writing(out):
         write_frame(done[-1].seen, out)
         calibration.save(out / "calibration.json")
         return finished.write(out / "report.html")
 
 
-def _document(done: list[Step], calibration: Calibration, report: Path) -> dict[str, Any]:
+def _document(done: list[Step], calibration: Calibration, contents: list[Content], report: Path) -> dict[str, Any]:
     return {
         "schema": "siloscope.demo/1",
         "report": str(report),
         "frames": [step.to_dict() for step in done],
+        "contents": [content.to_dict() for content in contents],
         "calibration": {key: value for key, value in calibration.to_dict().items() if key != "evidence"},
     }

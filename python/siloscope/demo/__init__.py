@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import siloscope
 from siloscope.calibration import Calibration
+from siloscope.content import Content
 from siloscope.estimate import Estimate
 from siloscope.paper.metrics import pc_average_distance, transform_error
 from siloscope.paper.scenarios import looking_at
@@ -117,6 +118,13 @@ def _sensor(method: str) -> str | None:
 def fused(steps: Sequence[Step]) -> Calibration:
     """All frames of the discharge as one calibration of the silo."""
     return siloscope.calibrate([step.estimates["surface"] for step in steps])
+
+
+def measured(steps: Sequence[Step], calibration: Calibration) -> Iterator[Content]:
+    """What each frame's silo holds, by the calibration that all frames gave; nothing without one."""
+    if calibration.pose is not None:
+        for step in steps:
+            yield siloscope.measure(step.seen.frame(), calibration, product="wheat")
 
 
 def write_frame(seen: SimulatedFrame, directory: Path) -> None:

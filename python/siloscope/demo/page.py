@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 import siloscope
 from siloscope import plots
 from siloscope.calibration import Calibration
-from siloscope.demo import METHODS, SCENE, SENSOR, Step
+from siloscope.content import Content
+from siloscope.demo import METHODS, SCENE, SENSOR, Step, content
 from siloscope.paper.metrics import transform_error
 from siloscope.report import Report, command, picture, table, text
 from siloscope.results import pictures
@@ -21,8 +22,8 @@ _NAMES = {"surface": "surface fit", "shape-tensor": "the paper's six steps"}
 _DPI = 100
 
 
-def page(steps: Sequence[Step], calibration: Calibration) -> Report:
-    """The report of a discharge and what all its frames say together."""
+def page(steps: Sequence[Step], calibration: Calibration, contents: Sequence[Content]) -> Report:
+    """The report of a discharge, what all its frames say together, and what each holds."""
     last = steps[-1]
     report = Report(
         "A silo, emptied in front of a depth camera",
@@ -36,6 +37,7 @@ def page(steps: Sequence[Step], calibration: Calibration) -> Report:
     report.section("What was found in the last frame", *_found(last), _png(shown["clouds"], _CLOUDS))
     report.section("Over the discharge", *_discharge(steps))
     report.section("All frames together", *_calibration(steps, calibration))
+    report.section("What is in it", *content.section(steps, contents))
     report.section("How it is found", *_how(shown))
     report.section("What this means, and what it does not", *_meaning(steps))
     return report.section("Your own frame", *_yours())

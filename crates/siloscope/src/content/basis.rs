@@ -46,7 +46,7 @@ pub struct Roughness {
 }
 
 /// Ranges of the smooth rest, in radii.
-pub const RANGES: [f64; 2] = [1.0, 0.45];
+pub const RANGES: [f64; 3] = [1.0, 0.45, 0.2];
 
 /// The functions of a surface about one centre.
 #[derive(Debug, Clone)]

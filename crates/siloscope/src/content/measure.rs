@@ -5,7 +5,7 @@ use super::cells::{Tally, gather};
 use super::classify::{Classified, Floor, Thing, classify};
 use super::doubt::{Covariance, DEPTH, GEOMETRY, Lever, POSE, Parameters, deviation, share};
 use super::drift::settle;
-use super::fit::Surface;
+use super::fit::{Surface, WIDER};
 use super::grid::Grid;
 use super::returns::{Returns, Source};
 use super::shape::{Sample, Shape, shape};
@@ -203,7 +203,8 @@ fn doubts(surface: &Surface, volume: &Volume, cells: &[Cell], lever: &Lever, set
     derivatives[6] += volume.geometry.apex;
     let patch = surface.patch * surface.grid.cell().powi(2);
     let hidden = (volume.area - volume.seen).max(0.0) * patch * surface.roughness.powi(2);
-    let unseen = (left.dot(&surface.trend.spread(&left)) - noise).max(0.0) + hidden;
+    let continued = (left.dot(&surface.trend.spread(&left)) - noise).max(0.0);
+    let unseen = WIDER * WIDER * continued + hidden;
     let grid = grid_error(&surface.grid, volume, &setup.vessel);
     let known = deviation(&derivatives, covariance).powi(2);
     let out = Doubts {
