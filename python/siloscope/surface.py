@@ -22,6 +22,8 @@ PARAMETERS = (
 )
 """Order of the parameters: pose; radius; cone (radius per metre of height, z of its vertex); depth bias; ovality."""
 
+OVALITY = PARAMETERS.index("oval_cos")
+
 DIAMETER_STD = 0.002
 """Standard deviation of a tape-measured diameter, m."""
 
@@ -39,7 +41,7 @@ class SurfaceEvidence:
     """
 
     parameters: NDArray[np.float64]
-    """The answer; NaN where a part was not seen."""
+    """The answer with the silo's ovality estimated; NaN where a part was not seen."""
     information: NDArray[np.float64]
     """Information of this frame alone."""
     gradient: NDArray[np.float64]
@@ -280,23 +282,24 @@ def _evidence(
 ) -> SurfaceEvidence:
     slope, apex = found["cone"] or (np.nan, np.nan)
     radius = np.nan if found["radius"] is None else found["radius"]
-    free = np.array(found["free"])
+    prior = found["prior"]
+    free = np.array(found["free"]) | (np.arange(len(PARAMETERS)) >= OVALITY) & (prior > 0.0)
     expected = np.full(len(PARAMETERS), np.nan)
     expected[7:10] = profile.bias
-    expected[10:] = 0.0
+    expected[OVALITY:] = 0.0
     if diameter is not None:
         expected[4] = diameter / 2.0
     if gravity is not None:
         tilt = SiloPose.from_axis(gravity, np.zeros(3))
         expected[:2] = tilt.r_x, tilt.r_y
     return SurfaceEvidence(
-        parameters=np.array([*found["pose"], radius, slope, apex, *found["bias"], *found["ovality"]]),
+        parameters=np.array([*found["pose"], radius, slope, apex, *found["bias"], *found["ovality"]]) + found["step"],
         information=found["information"],
         gradient=found["gradient"],
         scatter=found["scatter"],
         noise=found["noise_share"],
         free=free,
         prior_mean=expected,
-        prior_information=found["prior"],
+        prior_information=prior,
         scale_std=0.0 if free[8] else profile.bias_std[1],
     )

@@ -115,6 +115,7 @@ fn add_share(py: Python<'_>, out: &Bound<'_, PyDict>, share: &FrameShare) -> PyR
     for (name, m) in [("information", &share.information), ("scatter", &share.scatter), ("noise_share", &share.noise)] {
         out.set_item(name, matrix(py, m)?)?;
     }
+    out.set_item("step", PyArray1::from_slice(py, share.step.as_slice()))?;
     out.set_item("gradient", PyArray1::from_slice(py, share.gradient.as_slice()))?;
     out.set_item("prior", PyArray1::from_slice(py, share.prior.as_slice()))
 }

@@ -1,8 +1,8 @@
 //! How sure the fit is: the noise's covariance, widened by what the residuals say about the model, and the scale.
 
 use crate::polish::TileEquation;
-use crate::refine::{Equation, Fit, Prior, Problem, System, tukey};
-use crate::surface::{Information, PARAMETERS, Parameters};
+use crate::refine::{Equation, Fit, Problem, System, tukey};
+use crate::surface::{Information, OVALITY, PARAMETERS, Parameters};
 
 /// The model's covariance, widened in those directions in which groups of tiles disagree more than it says.
 ///
@@ -71,13 +71,13 @@ fn chance(samples: usize) -> f64 {
 /// Within a tile the pixels scatter by the sensor's noise and by the wall's relief across it. A grazing ray meets the
 /// relief's crests and not its troughs, so the mean wall is seen shifted inwards. That shift follows the incidence over
 /// the whole frame, and beside that each block of tiles sees its own part of the pattern: neither averages out as noise.
-pub fn relief_uncertainty(problem: &Problem, fit: &Fit, tiles: &[TileEquation], form: f64) -> Information {
+pub fn relief_uncertainty(joint: &System, fit: &Fit, tiles: &[TileEquation], form: f64) -> Information {
     let relief = relief(tiles);
     let off = (RELIEF_SHARE * relief).hypot(form);
     if off == 0.0 {
         return Information::zeros();
     }
-    let (mut pull, mut system) = (Parameters::zeros(), System::with_prior(problem.prior, fit));
+    let (mut pull, mut system) = (Parameters::zeros(), joint.prior_alone());
     for TileEquation { equation: e, .. } in tiles {
         let weight = tukey(e.residual * e.residual / e.variance);
         let across = off / e.cosine;
@@ -92,8 +92,7 @@ pub fn relief_uncertainty(problem: &Problem, fit: &Fit, tiles: &[TileEquation], 
 
 /// Whether the residuals show that the silo is oval: the two parts of its ovality against their covariance.
 pub fn shows_ovality(problem: &Problem, fit: &Fit, tiles: &mut [TileEquation], std: f64) -> bool {
-    let prior = Prior { ovality_std: std, ..problem.prior.clone() };
-    let mut system = System::with_prior(&prior, fit);
+    let mut system = System::with_prior(problem.prior, fit).with_ovality(std);
     for tile in tiles {
         tile.allow(fit.misfit);
         let e = &tile.equation;
@@ -105,23 +104,8 @@ pub fn shows_ovality(problem: &Problem, fit: &Fit, tiles: &mut [TileEquation], s
     squared > SURE
 }
 
-/// First of the ovality's two parameters.
-const OVALITY: usize = 10;
 /// Chi-square of two degrees of freedom that chance passes once in 20,000 frames.
 const SURE: f64 = 20.0;
-
-/// The share of an ovality that was not estimated: where a frame can't tell it, it may be as large as silos have it.
-///
-/// The answer goes with it as the free parameters' equations say, and what the frame tells of it limits it.
-pub fn ovality_uncertainty(model: &Information, system: &System, std: f64) -> Information {
-    let mut information = system.information;
-    information.fill_upper_triangle_with_lower_triangle();
-    let coupled = information.fixed_columns::<2>(OVALITY);
-    let sensitivity = model * coupled;
-    let own = information.fixed_view::<2, 2>(OVALITY, OVALITY) - coupled.transpose() * sensitivity;
-    let left = (own + nalgebra::Matrix2::identity() / (std * std)).try_inverse();
-    left.map_or(Information::zeros(), |left| sensitivity * left * sensitivity.transpose())
-}
 
 /// How far a block's mean lies off by the relief, as a share of it.
 const RELIEF_SHARE: f64 = 0.3;

@@ -4,14 +4,14 @@ use crate::Result;
 use crate::Vec3;
 use crate::cloud::cloud_patches;
 use crate::coarse::{Settled, coarse_fit, drop_bare_parts};
-use crate::covariance::{ovality_uncertainty, relief_uncertainty, scale_uncertainty, shows_ovality, widened};
+use crate::covariance::{relief_uncertainty, scale_uncertainty, shows_ovality, widened};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
-use crate::refine::{Fit, Prior, Problem, tukey};
+use crate::refine::{Fit, Prior, Problem, free_parameters, tukey};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, DepthError, NoiseLaw};
-use crate::share::FrameShare;
-use crate::surface::{Information, PARAMETERS, Parameters, PlacedSurface};
+use crate::share::{FrameShare, among};
+use crate::surface::{Information, OVALITY, PARAMETERS, Parameters, PlacedSurface};
 use crate::verdict::WallEvidence;
 use crate::workers::Workers;
 
@@ -207,20 +207,20 @@ fn finish(
 ) -> Option<SurfaceFit> {
     let system = solve_equations(problem, &mut fit, tiles, 4)?;
     let pulls: Vec<f64> = tiles.iter().map(TileEquation::pull).collect();
-    let (model, free) = system.covariance(&fit)?;
-    let mut covariance = widened(problem, &model, &system, (tiles, &pulls));
+    let free = free_parameters(&fit, &system.prior);
+    let joint = if problem.patches.cloud { system } else { system.with_ovality(OVALITY_STD) };
+    let (model, jointly_free) = joint.covariance(&fit)?;
+    let mut covariance = widened(problem, &model, &joint, (tiles, &pulls));
     if noise_is_known {
-        covariance += relief_uncertainty(problem, &fit, tiles, form(&fit, free[10]));
-    }
-    if !problem.patches.cloud && !free[10] {
-        covariance += ovality_uncertainty(&model, &system, OVALITY_STD);
+        covariance += relief_uncertainty(&joint, &fit, tiles, form(&fit, free[OVALITY]));
     }
     let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
     if !is_determined(&covariance, &placed, heights / tiles.len().max(1) as f64) {
         return None;
     }
-    let share = FrameShare::new((&system, &covariance), (tiles, &pulls), &free);
+    let share = FrameShare::new((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free));
+    let mut covariance = among(&covariance, &free);
     if !free[8] {
         covariance += scale_uncertainty(&fit, problem.prior.bias_std[1]);
     }

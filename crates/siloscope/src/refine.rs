@@ -8,7 +8,7 @@
 use crate::Vec3;
 use crate::patches::Patches;
 use crate::sensor::{DepthBias, NoiseLaw};
-use crate::surface::{Information, Local, PARAMETERS, Parameters, Part, PlacedSurface, SiloSurface};
+use crate::surface::{Information, Local, OVALITY, PARAMETERS, Parameters, Part, PlacedSurface, SiloSurface};
 
 /// What is known before the frame is looked at.
 #[derive(Debug, Clone)]
@@ -304,8 +304,8 @@ impl System {
             }
         }
         if prior.ovality_std > 0.0 {
-            system.add_prior(10, fit.surface.ovality[0], prior.ovality_std);
-            system.add_prior(11, fit.surface.ovality[1], prior.ovality_std);
+            system.add_prior(OVALITY, fit.surface.ovality[0], prior.ovality_std);
+            system.add_prior(OVALITY + 1, fit.surface.ovality[1], prior.ovality_std);
         }
         if let (Some((radius, std)), Some(now)) = (prior.radius, fit.surface.radius) {
             system.add_prior(4, now - radius, std);
@@ -317,6 +317,21 @@ impl System {
             system.add_prior(1, pose.r_y - expected.r_y, std);
         }
         system
+    }
+
+    /// The same with ovality among the parameters; for a fit that took the silo for round, or had it already.
+    pub fn with_ovality(mut self, std: f64) -> Self {
+        for k in [OVALITY, OVALITY + 1] {
+            if self.prior[(k, k)] == 0.0 {
+                self.add_prior(k, 0.0, std);
+            }
+        }
+        self
+    }
+
+    /// Without what the frame says.
+    pub fn prior_alone(&self) -> Self {
+        Self { information: self.prior, gradient: Parameters::zeros(), prior: self.prior }
     }
 
     fn add_prior(&mut self, k: usize, residual: f64, std: f64) {
@@ -400,6 +415,6 @@ impl System {
 pub fn free_parameters(fit: &Fit, prior: &Information) -> [bool; PARAMETERS] {
     let (cylinder, cone) = (fit.surface.radius.is_some(), fit.surface.cone.is_some());
     let known = |k: usize| prior[(k, k)] > 0.0;
-    let oval = [known(10), known(11)];
+    let oval = [known(OVALITY), known(OVALITY + 1)];
     [true, true, true, true, cylinder, cone, cone, known(7), known(8) && known(4), known(9), oval[0], oval[1]]
 }

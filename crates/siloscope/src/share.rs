@@ -3,17 +3,21 @@
 //! Near the answer θ the frame's negative log-likelihood is g·δ + δᵀΛδ/2 for a step δ. Λ and g add up over frames; how
 //! uncertain their sum is depends on how much of g's scatter is new in every frame (the sensor's noise) and how much
 //! comes back (dents, corrugation, a warped lens).
+//!
+//! A frame's own answer may take the silo for round. What it says here never does: other frames may see its ovality.
 
 use crate::polish::TileEquation;
 use crate::refine::{System, tukey};
-use crate::surface::{Information, PARAMETERS, Parameters};
+use crate::surface::{Information, OVALITY, PARAMETERS, Parameters};
 
 /// What one frame alone says.
 #[derive(Debug, Clone)]
 pub struct FrameShare {
+    /// From the frame's own answer to θ: what its ovality would change, where the answer leaves it out.
+    pub step: Parameters,
     /// Information Λ.
     pub information: Information,
-    /// Gradient g of the negative log-likelihood at the answer; the priors' gradient balances it.
+    /// Gradient g of the negative log-likelihood at θ; the priors' gradient balances it.
     pub gradient: Parameters,
     /// Covariance of g as the residuals have it.
     pub scatter: Information,
@@ -24,11 +28,12 @@ pub struct FrameShare {
 }
 
 impl FrameShare {
-    /// From the last equations and how they pull, the system they make, and the covariance of the free parameters.
+    /// From the system of all parameters with its covariance, as the noise has it and as the residuals have it; the
+    /// last equations and how they pull; and which parameters are free in the frame's own answer, and here.
     pub fn new(
-        (system, covariance): (&System, &Information),
+        (system, model, covariance): (&System, &Information, &Information),
         (tiles, pulls): (&[TileEquation], &[f64]),
-        free: &[bool; PARAMETERS],
+        (alone, free): (&[bool; PARAMETERS], &[bool; PARAMETERS]),
     ) -> Self {
         let mut information = system.information - system.prior;
         information.fill_upper_triangle_with_lower_triangle();
@@ -40,13 +45,19 @@ impl FrameShare {
         }
         let mut noise = sensor.information;
         noise.fill_upper_triangle_with_lower_triangle();
+        let mut step = Parameters::zeros();
+        if free[OVALITY] && !alone[OVALITY] {
+            // all other parameters are at their best already
+            step = -model.fixed_columns::<2>(OVALITY) * gradient.fixed_rows::<2>(OVALITY);
+            gradient += information * step;
+        }
         let joint = among(&(information + system.prior), free);
         let scatter = joint * covariance * joint - among(&system.prior, free);
-        Self { information, gradient, scatter, noise, prior: system.prior.diagonal() }
+        Self { step, information, gradient, scatter, noise, prior: system.prior.diagonal() }
     }
 }
 
 /// The rows and columns of the free parameters; zero elsewhere.
-fn among(m: &Information, free: &[bool; PARAMETERS]) -> Information {
+pub fn among(m: &Information, free: &[bool; PARAMETERS]) -> Information {
     m.map_with_location(|r, c, v| if free[r] && free[c] { v } else { 0.0 })
 }

@@ -11,6 +11,9 @@ use nalgebra::{Matrix3, SMatrix, SVector};
 /// Number of parameters of the fit.
 pub const PARAMETERS: usize = 12;
 
+/// Index of the first of the ovality's two parameters.
+pub const OVALITY: usize = 10;
+
 /// Order of the parameters: r_x, r_y, t_x, t_y, radius, cone slope, apex, the depth bias (offset, scale, quadratic), and
 /// the ovality (cosine and sine part).
 pub type Parameters = SVector<f64, PARAMETERS>;
