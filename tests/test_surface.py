@@ -9,7 +9,7 @@ import pytest
 
 from siloscope import Estimate, SiloPose, sensors
 from siloscope.paper import metrics
-from siloscope.paper.scenarios import scenario
+from siloscope.paper.scenarios import random_scene, scenario
 from siloscope.scene import ASTRA_S, Feed, Scene
 from siloscope.surface import fit_depth, reasons
 
@@ -65,6 +65,16 @@ def test_a_known_diameter_replaces_the_profile(name: str) -> None:
     scene = replace(scenario(name), sensor=ASTRA_S)
     assert gap(fit(scene, None, diameter=2 * scene.silo.radius), scene) < 2.0
     assert gap(fit(scene, None), scene) < 30.0
+
+
+def test_a_narrow_band_of_wall_tells_where_the_axis_runs_and_gravity_its_direction() -> None:
+    scene = random_scene(128, Feed("funnel", 0.45), sensor=ASTRA_S)
+    alone = fit(scene, "orbbec-astra-s")
+    assert (alone.status, alone.reason) == ("refused", "direction-unknown")
+    held = fit(scene, "orbbec-astra-s", gravity=scene.pose.axis_direction, gravity_std=2e-3)
+    assert held.pose is not None
+    assert held.covariance is not None
+    assert gap(held, scene) < 3e3 * np.sqrt(held.covariance.diagonal()[2:].max())
 
 
 def test_every_reason_has_a_meaning_and_advice() -> None:

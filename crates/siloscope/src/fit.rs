@@ -99,8 +99,7 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     }
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
     clock.lap("pixels");
-    let mut result =
-        finish(&problem, fit, &mut equations, evidence, know.error.noise.is_some()).ok_or(Refusal::PoorlyDetermined)?;
+    let mut result = finish(&problem, fit, &mut equations, evidence, know.error.noise.is_some())?;
     clock.lap("covariance");
     result.timing = clock.laps;
     result.patches = patches;
@@ -158,8 +157,9 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
     drop_bare_parts(&problem, &mut fit, &wall);
     let mut equations = patch_equations(&problem, &fit, &wall);
-    let Some(mut result) = finish(&problem, fit, &mut equations, evidence, false) else {
-        return Ok(Err(Refusal::PoorlyDetermined));
+    let mut result = match finish(&problem, fit, &mut equations, evidence, false) {
+        Ok(found) => found,
+        Err(refusal) => return Ok(Err(refusal)),
     };
     clock.lap("covariance");
     result.timing = clock.laps;
@@ -189,12 +189,17 @@ fn prior(know: &Knowledge) -> Prior {
 }
 
 /// Whether the axis is known well enough: its direction, and its position in the middle of the wall that was seen.
-fn is_determined(covariance: &Information, placed: &PlacedSurface, height: f64) -> bool {
+fn check_determined(covariance: &Information, placed: &PlacedSurface, height: f64) -> std::result::Result<(), Refusal> {
     let [x, y] = placed.axis_shift(height);
     let variance = |row: &Parameters| row.dot(&(covariance * row));
     let direction = (covariance[(0, 0)] + covariance[(1, 1)]).sqrt();
     let position = (variance(&x) + variance(&y)).sqrt();
-    direction < MAX_DIRECTION_STD && position < MAX_POSITION_STD * placed.surface.size()
+    match (direction < MAX_DIRECTION_STD, position < MAX_POSITION_STD * placed.surface.size()) {
+        (true, true) => Ok(()),
+        (true, false) => Err(Refusal::PositionUnknown),
+        (false, true) => Err(Refusal::DirectionUnknown),
+        (false, false) => Err(Refusal::PoorlyDetermined),
+    }
 }
 
 /// Last solution, covariance and residuals.
@@ -204,21 +209,19 @@ fn finish(
     tiles: &mut [TileEquation],
     evidence: WallEvidence,
     noise_is_known: bool,
-) -> Option<SurfaceFit> {
-    let system = solve_equations(problem, &mut fit, tiles, 4)?;
+) -> Outcome {
+    let system = solve_equations(problem, &mut fit, tiles, 4).ok_or(Refusal::PoorlyDetermined)?;
     let pulls: Vec<f64> = tiles.iter().map(TileEquation::pull).collect();
     let free = free_parameters(&fit, &system.prior);
     let joint = if problem.patches.cloud { system } else { system.with_ovality(OVALITY_STD) };
-    let (model, jointly_free) = joint.covariance(&fit)?;
+    let (model, jointly_free) = joint.covariance(&fit).ok_or(Refusal::PoorlyDetermined)?;
     let mut covariance = widened(problem, &model, &joint, (tiles, &pulls));
     if noise_is_known {
         covariance += relief_uncertainty(&joint, &fit, tiles, form(&fit, free[OVALITY]));
     }
     let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
-    if !is_determined(&covariance, &placed, heights / tiles.len().max(1) as f64) {
-        return None;
-    }
+    check_determined(&covariance, &placed, heights / tiles.len().max(1) as f64)?;
     let share = FrameShare::new((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free));
     let mut covariance = among(&covariance, &free);
     if !free[8] {
@@ -235,7 +238,7 @@ fn finish(
         chi += weight * squared;
         weights += weight;
     }
-    Some(SurfaceFit {
+    Ok(SurfaceFit {
         covariance,
         share,
         free,

@@ -17,11 +17,15 @@ pub enum Refusal {
     BehindWall,
     /// Wall, but too little of it to fix the pose.
     PoorlyDetermined,
+    /// Wall that fixes the axis' direction, but not where the axis runs.
+    PositionUnknown,
+    /// Wall that fixes where the axis runs, but not its direction.
+    DirectionUnknown,
 }
 
 impl Refusal {
     /// Every reason.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::NoDepth,
         Self::NoWall,
         Self::Flat,
@@ -29,6 +33,8 @@ impl Refusal {
         Self::ConeMayBeFeed,
         Self::BehindWall,
         Self::PoorlyDetermined,
+        Self::PositionUnknown,
+        Self::DirectionUnknown,
     ];
 
     /// Stable name, what it means, and what to try.
@@ -68,6 +74,16 @@ impl Refusal {
                 "poorly-determined",
                 "wall is in view, but too little of it to fix the axis",
                 "wait until the level has fallen, or turn the camera so that more of the wall is in view",
+            ),
+            Self::PositionUnknown => (
+                "position-unknown",
+                "the wall in view tells how the axis is directed, but not where it runs",
+                "turn the camera so that more of the circle is in view, or give the sensor's profile or a diameter",
+            ),
+            Self::DirectionUnknown => (
+                "direction-unknown",
+                "the wall in view tells where the axis runs, but not how it is directed",
+                "turn the camera so that more of the wall's height is in view, or give gravity",
             ),
         }
     }
