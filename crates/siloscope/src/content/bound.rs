@@ -73,6 +73,7 @@ impl Bound {
     }
 
     /// Tells a return on the wall from one inside; |Δr| ≤ k σ is tested as |r² − R²| ≤ 2 k (|p·ray| σ_d + R σ_R).
+    #[inline]
     pub fn side(&self, [x, y, z]: [f32; 3], depth: f32) -> Side {
         let [by_depth, by_radius] = self.margin(depth);
         let along = (x * (x - self.camera[0]) + y * (y - self.camera[1])).abs();
@@ -112,6 +113,9 @@ impl Bound {
 fn farthest(depth: &[f32]) -> f32 {
     let (chunks, rest) = depth.as_chunks::<4>();
     let most = |a: f32, b: f32| if b > a { b } else { a };
-    let four = chunks.iter().fold([0.0; 4], |m, d| [0, 1, 2, 3].map(|k| most(m[k], d[k])));
+    let mut four = [0.0; 4];
+    for chunk in chunks {
+        four.iter_mut().zip(chunk).for_each(|(m, &d)| *m = most(*m, d));
+    }
     four.into_iter().chain(rest.iter().copied()).fold(0.0, most)
 }

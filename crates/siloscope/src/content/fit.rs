@@ -308,7 +308,7 @@ impl<'a> Work<'a> {
 
 /// The trend of the roughness under which the cells are most probable, found by climbing.
 fn most_probable(sums: &Sums, basis: &Basis) -> Option<(Roughness, Trend)> {
-    let mut at = Steps { bend: 2, rest: 1, range: 0 };
+    let mut at = Steps { bend: 2, rest: 0, range: 0 };
     let mut best = sums.solve(basis, at.roughness())?;
     let mut tried = vec![at];
     while let Some(next) = at.around().find(|next| !tried.contains(next)) {
