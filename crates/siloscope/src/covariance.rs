@@ -71,8 +71,12 @@ fn chance(samples: usize) -> f64 {
 /// Within a tile the pixels scatter by the sensor's noise and by the wall's relief across it. A grazing ray meets the
 /// relief's crests and not its troughs, so the mean wall is seen shifted inwards. That shift follows the incidence over
 /// the whole frame, and beside that each block of tiles sees its own part of the pattern: neither averages out as noise.
-pub fn relief_uncertainty(joint: &System, fit: &Fit, tiles: &[TileEquation], form: f64) -> Information {
-    let relief = relief(tiles);
+pub fn relief_uncertainty(
+    joint: &System,
+    fit: &Fit,
+    tiles: &[TileEquation],
+    (relief, form): (f64, f64),
+) -> Information {
     let off = (RELIEF_SHARE * relief).hypot(form);
     if off == 0.0 {
         return Information::zeros();
@@ -111,7 +115,7 @@ const SURE: f64 = 20.0;
 const RELIEF_SHARE: f64 = 0.3;
 
 /// Root-mean-square relief across the wall, metres; 0 where the pixels' scatter needs none beside the noise.
-fn relief(tiles: &[TileEquation]) -> f64 {
+pub fn relief(tiles: &[TileEquation]) -> f64 {
     let (mut weights, mut sum) = (0.0, 0.0);
     for TileEquation { equation: e, noise, scatter, count, .. } in tiles {
         let across = e.cosine * e.cosine;

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::Vec3;
 use crate::cloud::cloud_patches;
 use crate::coarse::{Settled, coarse_fit, drop_bare_parts};
-use crate::covariance::{relief_uncertainty, scale_uncertainty, shows_ovality, widened};
+use crate::covariance::{relief, relief_uncertainty, scale_uncertainty, shows_ovality, widened};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
 use crate::refine::{Fit, Prior, Problem, free_parameters, tukey};
@@ -82,20 +82,14 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     if let (Some((radius, _)), true) = (know.radius, prior.bias_std[1] > 0.0) {
         fit.rescale_to(radius);
     }
-    let mut problem = Problem { patches: &patches, noise, prior: &prior, pixel };
+    let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
     drop_bare_parts(&problem, &mut fit, &wall);
-    for reach in [3.0, 2.0] {
-        problem.noise = polish(&problem, image, &mut fit, &wall, reach, know.error.noise);
-    }
-    let noise = problem.noise;
-    let mut equations = pixel_equations(&problem, image, &fit, &wall, &ALL);
-    if shows_ovality(&problem, &fit, &mut equations, OVALITY_STD) {
+    let (noise, mut equations) = on_pixels(problem, image, &mut fit, &wall, know.error.noise);
+    let round = Problem { patches: &patches, noise, prior: &prior, pixel };
+    if shows_ovality(&round, &fit, &mut equations, OVALITY_STD) {
         prior.ovality_std = OVALITY_STD;
-        let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-        for reach in [3.0, 2.0] {
-            polish(&problem, image, &mut fit, &wall, reach, Some(noise));
-        }
-        equations = pixel_equations(&problem, image, &fit, &wall, &ALL);
+        let oval = Problem { patches: &patches, noise, prior: &prior, pixel };
+        (_, equations) = on_pixels(oval, image, &mut fit, &wall, Some(noise));
     }
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
     clock.lap("pixels");
@@ -104,6 +98,20 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     result.timing = clock.laps;
     result.patches = patches;
     Ok(result)
+}
+
+/// Steps on some of the pixels, then the equations of all; and the noise law, from the residuals where none is known.
+fn on_pixels(
+    mut problem: Problem,
+    image: &DepthImage,
+    fit: &mut Fit,
+    wall: &[bool],
+    known: Option<NoiseLaw>,
+) -> (NoiseLaw, Vec<TileEquation>) {
+    for reach in [3.0, 2.0] {
+        problem.noise = polish(&problem, image, fit, wall, reach, known);
+    }
+    (problem.noise, pixel_equations(&problem, image, fit, wall, &ALL))
 }
 
 /// Largest standard deviation of the axis' direction that still is an answer, radians.
@@ -216,9 +224,8 @@ fn finish(
     let joint = if problem.patches.cloud { system } else { system.with_ovality(OVALITY_STD) };
     let (model, jointly_free) = joint.covariance(&fit).ok_or(Refusal::PoorlyDetermined)?;
     let mut covariance = widened(problem, &model, &joint, (tiles, &pulls));
-    if noise_is_known {
-        covariance += relief_uncertainty(&joint, &fit, tiles, form(&fit, free[OVALITY]));
-    }
+    let relief = if noise_is_known { relief(tiles) } else { 0.0 };
+    covariance += relief_uncertainty(&joint, &fit, tiles, (relief, form(&fit, free[OVALITY])));
     let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
     check_determined(&covariance, &placed, heights / tiles.len().max(1) as f64)?;
@@ -227,9 +234,26 @@ fn finish(
     if !free[8] {
         covariance += scale_uncertainty(&fit, problem.prior.bias_std[1]);
     }
-    let mut residuals = vec![f64::NAN; problem.patches.list.len()];
+    let (residuals, chi_square) = residuals(tiles, problem.patches.list.len());
+    Ok(SurfaceFit {
+        covariance,
+        share,
+        free,
+        noise: problem.noise,
+        chi_square,
+        evidence,
+        patches: Patches::default(),
+        residuals,
+        fit,
+        timing: Vec::new(),
+    })
+}
+
+/// Residual of each of n patches across the wall, NaN where it does not count, and their reduced chi-square.
+fn residuals(tiles: &[TileEquation], n: usize) -> (Vec<f64>, f64) {
+    let mut residuals = vec![f64::NAN; n];
     let (mut chi, mut weights) = (0.0, 0.0);
-    for TileEquation { patch, equation: e, .. } in tiles.iter() {
+    for TileEquation { patch, equation: e, .. } in tiles {
         let squared = e.residual * e.residual / e.variance;
         let weight = tukey(squared);
         if weight > 0.0 {
@@ -238,18 +262,7 @@ fn finish(
         chi += weight * squared;
         weights += weight;
     }
-    Ok(SurfaceFit {
-        covariance,
-        share,
-        free,
-        noise: problem.noise,
-        chi_square: chi / f64::max(weights, 1.0),
-        evidence,
-        patches: Patches::default(),
-        residuals,
-        fit,
-        timing: Vec::new(),
-    })
+    (residuals, chi / f64::max(weights, 1.0))
 }
 
 /// Milliseconds of the stages.
