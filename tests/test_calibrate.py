@@ -228,6 +228,24 @@ def test_frames_that_show_no_wall_are_refused_and_told() -> None:
     assert mixed.counts["refused"] == 2
 
 
+def without_scale(frame: Estimate, scale: float) -> Estimate:
+    """As a frame without cylinder comes out: the diameter says nothing, the depth scale is left where it was."""
+    evidence = frame.evidence
+    assert evidence is not None
+    free, parameters = evidence.free.copy(), evidence.parameters.copy()
+    free[8], parameters[8] = False, scale
+    return replace(frame, evidence=replace(evidence, free=free, parameters=parameters))
+
+
+def test_frames_whose_diameter_tells_no_scale_are_fused_with_the_others() -> None:
+    frames = sequence(sensor=None, diameter=3.0)
+    some = [without_scale(frame, scale) for frame, scale in zip(frames, (-0.018, -0.0174), strict=False)]
+    assert np.ptp([frame.evidence.parameters[8] for frame in some if frame.evidence is not None]) > 0.0
+    found = calibrate([*some, *frames[2:]])
+    assert found.ok
+    assert np.abs(errors(found)).max() < 2e-3
+
+
 def test_wrong_settings_are_told() -> None:
     with pytest.raises(UsageError, match="unknown rule"):
         calibrate(sequence(), rule="median")

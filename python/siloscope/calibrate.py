@@ -328,10 +328,13 @@ def _answer(history: _History, stack: Stack, fused: Fused, config: dict[str, Any
 
 
 def _check_common(stack: Stack) -> None:
-    """What no frame estimates must be the same in all: they were fitted with one sensor profile."""
+    """What was told of a parameter that a frame does not estimate must be the same in all: one sensor profile.
+
+    The frames' own values may differ: a bias that the diameter tells is left where it is in a frame without cylinder.
+    """
     for k in range(7, len(PARAMETERS)):
-        held = stack.answers[~stack.free[:, k], k]
-        if np.ptp(held) > 1e-12 if len(held) else False:
+        told = stack.expected[~stack.free[:, k], k]
+        if len(told) and np.ptp(np.nan_to_num(told)) > 1e-12:
             raise UsageError("the estimates were made with different sensor profiles; locate all frames with one")
 
 
