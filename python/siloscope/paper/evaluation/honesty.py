@@ -44,7 +44,7 @@ def wrong_answers(series: Sequence[Series]) -> str:
     frames = sum(len(one.level) for one in series)
     return (
         f"Of {frames} frames, these were answered more than {1e3 * FAR:g} mm off instead of refused: {listed(told)}. "
-        "A mean of the last estimates takes them along, the fusion can leave them out."
+        "A mean of the last estimates would take them along, a fusion can leave them out."
     )
 
 

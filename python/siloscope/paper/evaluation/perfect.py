@@ -11,6 +11,7 @@ from siloscope.paper.discharges import perfect
 from siloscope.paper.evaluation import published
 from siloscope.paper.evaluation.adjustments import Adjusted, Column
 from siloscope.paper.evaluation.chapter import Chapter, Verdict
+from siloscope.paper.evaluation.honesty import wrong_answers
 from siloscope.paper.evaluation.pictures import clouds, curves
 from siloscope.paper.evaluation.plan import Plan
 from siloscope.paper.evaluation.series import Series
@@ -45,6 +46,7 @@ def chapter(plan: Plan, results: Results) -> Chapter:
             INTRODUCTION,
             adjusted.table("table3", "Table 3: perfect silos, last estimate", published.TABLE3, ""),
             _settling(series),
+            wrong_answers(series),
             curves("fig9", "Fig. 9: errors, shares and distances over the discharge.", series, "Perfect silos"),
             clouds(
                 "fig10",
@@ -69,7 +71,7 @@ def _settling(series: list[Series]) -> str:
         + listed([f"from {_percent(one.settled(solver, 1e-3 * SETTLED))} on in {one.name}" for one in series])
         for solver in ("shape-tensor", "surface")
     ]
-    return "Feed level from which on results are settled: " + "; ".join(sentences) + "."
+    return "Feed level from which on results are settled. " + "; ".join(sentences) + "."
 
 
 def _percent(level: float | None) -> str:

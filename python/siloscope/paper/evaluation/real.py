@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
-from siloscope.paper.discharges import real
+from siloscope.paper.discharges import PRINTED, real
 from siloscope.paper.evaluation import published
 from siloscope.paper.evaluation.adjustments import Adjusted
 from siloscope.paper.evaluation.chapter import Chapter, Verdict
@@ -18,14 +18,14 @@ from siloscope.paper.evaluation.verdicts import judged, millimetres
 from siloscope.paper.jobs import Job
 from siloscope.paper.running import Results
 
-INTRODUCTION = """
+INTRODUCTION = f"""
 The paper's recordings are not public. These rows are **stand-ins**: simulated silos with Table 2's geometry and pose,
 an Orbbec Astra (noise and bias of its profile, one device's own bias, 1 mm steps, lost patches, flying pixels, dust), a
 wall that is out of round, with seams, dents and stuck feed, and irregular feed that slides between frames. They show
 what the methods do in such a silo; they can't show what the paper's camera saw.
 
 With Eqs. 5 to 7 as printed, Table 2's rotations make cameras that look away from the axis. "SiloR1" and "SiloR2" have
-the rotations negated, so that the cameras look at it; "as printed" has them as they stand.
+the rotations negated, so that the cameras look at it; "as printed" has them as they stand, with every {PRINTED}th step.
 """
 
 UNSEEN_SHAPE = """
