@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import shlex
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -34,8 +35,8 @@ SLOW = 4
 KINDS = (*SENSORS, IN_USE)
 
 INTRODUCTION = """
-The libraries that a user would reach for instead, on the same frames and in one run. This page is made by `make peers`;
-no number on it is typed by hand. How each library is set up and why is in `benchmarks/peers/README.md`.
+The libraries that a user would reach for instead, on the same frames and in one run. No number on this page is
+typed by hand. How each library is set up and why is in `benchmarks/peers/README.md`.
 
 Every method gets the depths of one 640 x 480 frame in memory and gives one axis. "told" is what it knows besides.
 Registration is told the silo's geometry, which is what the axis job does not give; it shows what could be had with it.
@@ -229,6 +230,8 @@ def _made(every: int, repeats: int) -> str:
     frames = len(list(scenes())[::every])
     return "\n".join(
         [
+            f"- Made by `{shlex.join(['python', *sys.argv])}` after `benchmarks/peers/install.py`; "
+            "`make peers` does both.",
             f"- Frames: {frames} scenes, each as a whole and with its walls alone; {repeats} runs a method, each with "
             "a seed of its own.",
             "- Columns in mm are medians of the PC average distance (Eq. 11) on the whole frame by kind of frame; a "
