@@ -22,8 +22,8 @@ from methods import METHODS, Found, Method
 from rich.progress import track
 from score import distances
 
+from siloscope import __version__
 from siloscope.paper.evaluation.tables import Cell, Table, number
-from siloscope.paper.jobs import program as version
 from siloscope.paper.timing import machine
 
 FAILURE = 0.1
@@ -238,7 +238,7 @@ def _made(every: int, repeats: int) -> str:
             f"failure is no answer or more than {1e3 * FAILURE:g} mm. {_exceptions()}",
             "- Times are processor time on one core, from depths in memory to the axis; what is known beforehand "
             "(a registration's target) is not counted.",
-            f"- Machine: {machine()}. Versions: siloscope {version()}, {', '.join(_versions())}.",
+            f"- Machine: {machine()}. Versions: siloscope {__version__}, {', '.join(_versions())}.",
         ]
     )
 
