@@ -83,7 +83,7 @@ def test_one_frame_gives_back_what_the_frame_said() -> None:
 
 
 def test_the_same_frame_many_times_is_no_surer_where_frames_share_their_error() -> None:
-    frame = located(replace(scenario("silo1"), sensor=ASTRA_S), sensor=None)
+    frame = located(SILO3, sensor=None)
     one, many = calibrate([frame]), calibrate([frame] * 20)
     assert one.silo_std.apex is not None
     assert many.silo_std.apex is not None
