@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import struct
 import sys
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,7 @@ import recording_files
 import siloscope.frames
 from siloscope import Camera, Frame, InputError
 from siloscope.cli import main
+from siloscope.frames import e57
 
 CLOUDS = "formats_las_e57"
 MUG = ("azure_kinect_mkv_mug", "recording.mkv")
@@ -313,3 +315,10 @@ def test_a_film_is_no_depth_recording(tmp_path: Path) -> None:
     path.write_bytes(whole.replace(b"DEPTH", b"RIGHT", 1))
     with pytest.raises(InputError, match="the tracks are: COLOR, RIGHT, IR, IMU"):
         siloscope.frames.open(path)
+
+
+def test_an_e57_packet_too_short_for_its_head_is_damage() -> None:
+    scan = e57.Scan("scan 0", 1, 0, ())
+    section = memoryview(struct.pack("<BBHH", 1, 0, 0, 0))  # a data packet of one byte
+    with pytest.raises(InputError, match="shorter than its own head"):
+        list(e57._packets(scan, section))

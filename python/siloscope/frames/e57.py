@@ -186,24 +186,30 @@ def _streams(file: PagedFile, scan: Scan, used: list[int]) -> dict[int, bytes]:
     return {column: b"".join(found) for column, found in parts.items()}
 
 
+_PACKET_HEAD = 6
+"""Bytes before a data packet's column sizes."""
+
+
 def _packets(scan: Scan, section: memoryview) -> Iterator[memoryview]:
     at = 0
-    while at + 6 <= len(section):
+    while at + _PACKET_HEAD <= len(section):
         kind, _, length = struct.unpack_from("<BBH", section, at)
         packet = section[at : at + length + 1]
         if len(packet) < length + 1 or kind > 2:
             raise InputError(f"{scan.name} is damaged: a packet runs over its end")
         at += length + 1
         if kind == _DATA_PACKET:
+            if len(packet) < _PACKET_HEAD:
+                raise InputError(f"{scan.name} is damaged: a packet is shorter than its own head")
             yield packet
 
 
 def _bytestreams(scan: Scan, packet: memoryview) -> Iterator[memoryview]:
     (count,) = struct.unpack_from("<H", packet, 4)
-    at = 6 + 2 * count
+    at = _PACKET_HEAD + 2 * count
     if count != len(scan.columns) or at > len(packet):
         raise InputError(f"{scan.name} is damaged: a packet has {count} columns, not {len(scan.columns)}")
-    for size in struct.unpack_from(f"<{count}H", packet, 6):
+    for size in struct.unpack_from(f"<{count}H", packet, _PACKET_HEAD):
         if at + size > len(packet):
             raise InputError(f"{scan.name} is damaged: a column runs over the end of its packet")
         yield packet[at : at + size]
