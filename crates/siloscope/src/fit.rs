@@ -108,7 +108,8 @@ fn on_pixels(
     wall: &[bool],
     known: Option<NoiseLaw>,
 ) -> (NoiseLaw, Vec<TileEquation>) {
-    for reach in [3.0, 2.0] {
+    let reaches: &[f64] = if known.is_some() { &[3.0] } else { &[3.0, 2.0] }; // a noise law asks for a second look
+    for &reach in reaches {
         problem.noise = polish(&problem, image, fit, wall, reach, known);
     }
     (problem.noise, pixel_equations(&problem, image, fit, wall, &ALL))
