@@ -10,7 +10,7 @@ import pytest
 from siloscope import Estimate, SiloPose, sensors
 from siloscope.paper import metrics
 from siloscope.paper.scenarios import random_scene, scenario
-from siloscope.scene import ASTRA_S, Feed, Scene
+from siloscope.scene import ASTRA_S, Feed, Scene, defects
 from siloscope.surface import fit_depth, reasons
 
 NAMES = ("silo1", "silo2", "silo3")
@@ -75,6 +75,26 @@ def test_a_narrow_band_of_wall_tells_where_the_axis_runs_and_gravity_its_directi
     assert held.pose is not None
     assert held.covariance is not None
     assert gap(held, scene) < 3e3 * np.sqrt(held.covariance.diagonal()[2:].max())
+
+
+def in_use(seed: int, shape: str, level: float, wall: str) -> Scene:
+    """An unseen silo whose wall is not ideal."""
+    scene = random_scene(seed, Feed(shape, level, seed=seed), sensor=ASTRA_S)
+    return replace(scene, defects=defects(wall, seed))
+
+
+def test_a_narrow_view_of_an_oval_silo_is_covered_by_the_stated_deviation() -> None:
+    scene = in_use(1016, "funnel", 0.4913, "seams,dents,oval,ladder,cables")
+    found = fit(scene, "orbbec-astra-s")
+    assert found.pose is not None
+    assert found.covariance is not None
+    error = np.array([getattr(found.pose, k) - getattr(scene.pose, k) for k in ("r_x", "r_y", "t_x", "t_y")])
+    assert np.all(np.abs(error) < 3.0 * np.sqrt(found.covariance.diagonal()))
+
+
+def test_an_auger_in_view_is_no_silo_seen_from_outside() -> None:
+    scene = in_use(1056, "funnel", 0.2966, "film,auger,dents,oval")
+    assert fit(scene, "orbbec-astra-s").status == "refused"
 
 
 def test_every_reason_has_a_meaning_and_advice() -> None:

@@ -89,6 +89,8 @@ fn candidates(problem: &Problem, view: View) -> Vec<(f64, Fit)> {
 }
 
 /// Whether a start value differs from a refined one by less than start values err: it would lead to the same answer.
+///
+/// Angles in radians, lengths as shares of the silo's size.
 fn is_near(start: &Start, fit: &Fit) -> bool {
     let (a, b) = (&start.surface, &fit.surface);
     let size = b.size();
