@@ -5,9 +5,12 @@ from __future__ import annotations
 import io
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 import warnings
+from pathlib import Path
 
 import pytest
 
@@ -118,8 +121,40 @@ def test_closed_pipe_is_quiet(monkeypatch: pytest.MonkeyPatch, capsys: pytest.Ca
     monkeypatch.setattr(sys, "stdout", io.StringIO())
     assert outcome.guarded(write_to_nobody, ["--json"]) == outcome.BROKEN_PIPE
     assert capsys.readouterr().err == ""
-    script = f"{sys.executable} -m siloscope --help | head -c 1 > /dev/null"
-    assert subprocess.run(["bash", "-c", script], capture_output=True, text=True).stderr == ""
+
+
+@pytest.mark.parametrize(
+    ("line", "code"),
+    [
+        ("--help | true", outcome.BROKEN_PIPE),
+        ("locate missing.png --json 2> /dev/null | true", 3),
+        ("locate missing.png --json 2> /dev/null > /dev/full", 3),
+        ("locate missing.png 2> /dev/full", 3),
+        ("--version >&-", 0),
+        ("locate missing.png --json 2>&-", 3),
+    ],
+)
+def test_streams_that_nobody_reads_cost_no_traceback(line: str, code: int) -> None:
+    script = f"set -o pipefail; {sys.executable} -m siloscope {line}"
+    done = subprocess.run(["bash", "-c", script], capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (code, "")
+    assert not done.stdout or json.loads(done.stdout)["exit_code"] == code
+
+
+def test_an_interruption_is_told_like_every_error(tmp_path: Path) -> None:
+    arguments = ["simulate", "--steps", "100000", "--out", str(tmp_path / "frames"), "--json"]
+    words = [sys.executable, "-m", "siloscope", *arguments]
+    with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
+        while not (tmp_path / "frames").exists():
+            time.sleep(0.01)
+        running.send_signal(signal.SIGINT)
+        out, err = running.communicate()
+    assert (running.returncode, err) == (outcome.INTERRUPTED, "error: interrupted\n")
+    assert json.loads(out)["error"] == "interrupted"
+
+
+def test_no_command_is_listed_twice() -> None:
+    assert len({command.name for command in COMMANDS}) == len(COMMANDS)
 
 
 def test_output_survives_a_terminal_without_its_letters() -> None:

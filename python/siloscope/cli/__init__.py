@@ -32,7 +32,6 @@ class Command(NamedTuple):
 COMMANDS: tuple[Command, ...] = (
     Command("calibrate", "calibrate:calibrate", "Fuse many frames to the silo's calibration: pose and geometry."),
     Command("demo", "demo:demo", "Simulate a discharge, find the axis in every frame, write a report: the first run."),
-    Command("measure", "measure:measure", "Measure the content: level, volume, fill and mass, with deviations."),
     Command("track", "track:track", "Follow the content over many frames: refills, withdrawals, empty-by date."),
     Command("locate", "locate:locate", "Find the silo's axis and the camera's pose in one frame."),
     Command("info", "info:info", "Show what is inside a recording, image, array, cloud or folder."),

@@ -26,18 +26,20 @@ BROKEN_PIPE = 141
 
 def guarded(run: Callable[[], Any], arguments: Sequence[str]) -> int:
     """Exit code of a command; whatever it raises becomes one sentence on stderr, never a traceback."""
-    for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # a terminal that cannot show "±" gets "?" instead of a crash
-            stream.reconfigure(errors="replace")
+    _make_streams_safe()
     as_json = "--json" in arguments
     try:
         with _plain_warnings():
             code = run() or 0
+            if code == INTERRUPTED:  # typer has caught the interruption and says no more than its code
+                raise KeyboardInterrupt
             sys.stdout.flush()
             return int(code)
     except BrokenPipeError:
         _silence_stdout()
         return BROKEN_PIPE
+    except SystemExit as ended:  # shell completion ends so, and rich, with code 1, where it finds the pipe closed
+        return BROKEN_PIPE if ended.code == 1 else int(ended.code or 0)
     except (KeyboardInterrupt, typer.Abort):
         return _report("interrupted", "interrupted", INTERRUPTED, as_json)
     except SiloscopeError as error:
@@ -67,10 +69,25 @@ def writing(path: object) -> Iterator[None]:
 
 
 def _report(kind: str, message: str, code: int, as_json: bool) -> int:
-    print(f"error: {message}", file=sys.stderr)
-    if as_json:
-        print_json({"schema": "siloscope.error/1", "error": kind, "message": message, "exit_code": code})
+    with contextlib.suppress(OSError):  # a full disk behind stderr does not change how the command ends
+        print(f"error: {message}", file=sys.stderr, flush=True)
+    try:
+        if as_json:
+            print_json({"schema": "siloscope.error/1", "error": kind, "message": message, "exit_code": code})
+        sys.stdout.flush()
+    except OSError:
+        _silence_stdout()
     return code
+
+
+def _make_streams_safe() -> None:
+    """A terminal that can't show "±" gets "?" instead of a crash; a stream that was closed swallows what it is given."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+        elif hasattr(stream, "reconfigure"):
+            stream.reconfigure(errors="replace")
 
 
 def _kind(error: SiloscopeError) -> str:
