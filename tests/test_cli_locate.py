@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import os
 import struct
 import zlib
 from collections.abc import Callable
@@ -19,6 +20,7 @@ import siloscope
 from siloscope.cli import main
 from siloscope.locate import METHODS
 from siloscope.paper.scenarios import scenario
+from siloscope.wording import printable
 from siloscope.writers import write_camera, write_npy, write_ply, write_png
 
 Shown = pytest.CaptureFixture[str]
@@ -328,6 +330,23 @@ def test_bad_frames(place: Path, tmp_path: Path, kind: str, capsys: Shown) -> No
     BAD_FRAMES[kind](path)
     given = ["locate", str(path), "--camera", str(place / "camera.json"), "--depth-unit", "0.001", "--json"]
     assert_one_sentence(main(given), capsys, (3,), "my-frame")
+
+
+@pytest.mark.parametrize("name", ["[/b].npy", "[bold]x.npy", "$\\frac$.npy", os.fsdecode(b"\xff\xfe.npy")])
+def test_any_name_of_a_file_is_told_and_drawn(name: str, place: Path, tmp_path: Path, capsys: Shown) -> None:
+    path = tmp_path / name
+    path.parent.mkdir(exist_ok=True)
+    path.write_bytes((place / "frame.npy").read_bytes())
+    given = [str(path), "--camera", str(place / "camera.json"), "--out", str(tmp_path / "out")]
+    shown = printable(name)
+    for command in ("locate", "measure"):
+        assert main([command, *given]) == 0
+        assert shown in capsys.readouterr().out
+    calibration = str(tmp_path / name.replace("npy", "json"))
+    assert main(["calibrate", str(path), *given[1:3], "-o", calibration]) == 0
+    assert main(["track", str(path), *given[1:], "--calibration", calibration]) == 0
+    assert shown in capsys.readouterr().out
+    assert shown in (tmp_path / "out" / "readings.csv").read_text("utf-8")
 
 
 @pytest.mark.parametrize("kind", BAD_CAMERAS)

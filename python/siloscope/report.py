@@ -42,7 +42,7 @@ class Report:
 
     def write(self, path: Path) -> Path:
         """Writes the page."""
-        path.write_text(self.html(), "utf-8")
+        path.write_text(self.html(), "utf-8", errors="replace")
         return path
 
 

@@ -1,4 +1,4 @@
-"""Numbers as people read them."""
+"""Numbers and names as people read them."""
 
 from __future__ import annotations
 
@@ -13,3 +13,8 @@ def with_std(value: float | None, std: float | None, factor: float, unit: str) -
         return f"{value * factor:.4g}{unit}"
     digits = 0 if std <= 0.0 else min(9, max(0, 1 - math.floor(math.log10(std * factor))))
     return f"{value * factor:.{digits}f} ± {std * factor:.{digits}f}{unit}"
+
+
+def printable(name: str) -> str:
+    """A file's name as text that every encoding of Unicode takes: bytes that are none, as in old archives, become "?"."""
+    return name.encode("utf-8", "replace").decode("utf-8")

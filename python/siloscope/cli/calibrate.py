@@ -14,7 +14,7 @@ from siloscope.calibration import QUALITY, Calibration
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, REFUSED, print_json, writing
 from siloscope.cli.progress import say, track
-from siloscope.cli.summary import pose_table, silo_line, tilt_line
+from siloscope.cli.summary import headline, pose_table, silo_line, tilt_line
 from siloscope.frames import FrameSource
 
 
@@ -78,10 +78,10 @@ def _print(found: Calibration, out: Path) -> None:
     console = Console(highlight=False, soft_wrap=True)
     counts = ", ".join(f"{count} {status}" for status, count in found.counts.items() if count)
     if not found.ok:
-        console.print(f"[bold yellow]refused[/] {found.reason} ({counts})", markup=True)
+        console.print(headline(False, f"{found.reason} ({counts})"))
         console.print(found.message or "", markup=False)
         return
-    console.print(f"[bold green]ok[/]      {out}: {counts}", markup=True)
+    console.print(headline(True, f"{out}: {counts}"))
     console.print(pose_table(found))
     for line in (tilt_line(found), silo_line(found.silo, found.silo_std)):
         console.print(line, markup=False)

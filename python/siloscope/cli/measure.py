@@ -8,12 +8,14 @@ from typing import Annotated, Any
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 import siloscope
 from siloscope.cli import options
 from siloscope.cli.outcome import REFUSED, print_json, writing
 from siloscope.cli.progress import say
+from siloscope.cli.summary import headline
 from siloscope.content import Content
 from siloscope.frame import Frame
 from siloscope.wording import with_std
@@ -122,16 +124,16 @@ def print_content(content: Content) -> None:
     """A short table on stdout, remarks on stderr."""
     console = Console(highlight=False, soft_wrap=True)
     if not content.ok:
-        console.print(f"[bold yellow]refused[/] {content.source}: {content.reason}", markup=True)
+        console.print(headline(False, f"{content.source}: {content.reason}"))
         console.print(content.message or "", markup=False)
         return
-    console.print(f"[bold green]ok[/]      {content.source}", markup=True)
+    console.print(headline(True, content.source))
     table = Table(box=None, show_header=False, padding=(0, 2, 0, 0))
     table.add_column(style="bold")
     table.add_column(justify="right")
     table.add_column(style="dim")
     for row in _rows(content):
-        table.add_row(*row)
+        table.add_row(*map(escape, row))
     console.print(table)
     for line in content.assumed:
         say(f"assumed: {line}")

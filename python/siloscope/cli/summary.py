@@ -6,6 +6,7 @@ import math
 
 from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from siloscope.calibration import Calibration
 from siloscope.estimate import Estimate, Ratios, SiloGeometry
@@ -23,14 +24,19 @@ def print_estimate(estimate: Estimate, source: str) -> None:
     """A short table on stdout."""
     console = Console(highlight=False, soft_wrap=True)
     if not estimate.ok:
-        console.print(f"[bold yellow]refused[/] {source}: {estimate.reason}", markup=True)
+        console.print(headline(False, f"{source}: {estimate.reason}"))
         console.print(estimate.message or "", markup=False)
         return
-    console.print(f"[bold green]ok[/]      {source}: method {estimate.method}")
+    console.print(headline(True, f"{source}: method {estimate.method}"))
     console.print(pose_table(estimate))
     for line in (tilt_line(estimate), silo_line(estimate.silo, estimate.silo_std), ratios_line(estimate.pixel_ratios)):
         if line:
             console.print(line, markup=False)
+
+
+def headline(ok: bool, rest: str) -> Text:
+    """The first line of an answer; brackets in a file's name are no markup."""
+    return Text.assemble(("ok     ", "bold green") if ok else ("refused", "bold yellow"), f" {rest}")
 
 
 def pose_table(estimate: Estimate | Calibration) -> Table:

@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 import siloscope
@@ -131,7 +132,7 @@ def _print(found: Track) -> None:
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("", overflow="fold")
     for reading in found.readings[-SHOWN:]:
-        table.add_row(*_row(reading, weighed))
+        table.add_row(*map(escape, _row(reading, weighed)))
     console.print(table)
     if len(found.readings) > SHOWN:
         say(f"{len(found.readings) - SHOWN} earlier readings not shown; --out, --json and --jsonl have all")

@@ -17,6 +17,7 @@ from siloscope.camera import Camera
 from siloscope.errors import InputError
 from siloscope.frame import Frame
 from siloscope.frames.terms import UnknownUnit, finish
+from siloscope.wording import printable
 
 MAX_SIDE = 20_000
 """Largest width or height of an image, in pixels (as in `Camera`)."""
@@ -122,12 +123,12 @@ class FrameSource(ABC):
 
     def __init__(self, path: Path, format: str, options: Options) -> None:
         self.path = path
-        self.name = str(path)
+        self.name = printable(str(path))
         self.format = format
         self.options = options
         self.timestamps: list[float] | None = None
         self.gravity: NDArray[np.float64] | None = None
-        self.provenance: dict[str, Any] = {"format": format, "file": path.name}
+        self.provenance: dict[str, Any] = {"format": format, "file": printable(path.name)}
         self.problems: list[str] = []
         self.file_camera: Camera | None = None
         self.file_depth_unit: float | None = None
@@ -222,7 +223,7 @@ class FrameSource(ABC):
             camera=frame.camera or self.file_camera,
             depth_unit=self.file_depth_unit if frame.depth_unit is None else frame.depth_unit,
             gravity=self.gravity if frame.gravity is None else frame.gravity,
-            source=self.name if self._count() == 1 else f"{self.name}, {item.label}",
+            source=self.name if self._count() == 1 else f"{self.name}, {printable(item.label)}",
             provenance={**self.provenance, "frame": item.label, **frame.provenance},
         )
 

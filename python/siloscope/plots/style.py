@@ -11,6 +11,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
+from siloscope.wording import printable
+
 INK = "#1b2733"
 MUTED = "#66727f"
 RULE = "#dfe4ea"
@@ -68,7 +70,7 @@ def legend(axes: Axes, below: bool = True, columns: int = 4, gap: float = 0.13) 
 
 def heading(made: Figure, text: str) -> None:
     """The sentence over the whole figure that says what it shows."""
-    made.suptitle(text, x=0.01, ha="left", fontsize=13, color=INK, fontweight="bold")
+    made.suptitle(printable(text), x=0.01, ha="left", fontsize=13, color=INK, fontweight="bold", parse_math=False)
 
 
 def save(made: Figure, path: Path) -> Path:

@@ -20,7 +20,7 @@ COLUMNS = (
 
 def write_csv(path: Path, found: Track) -> Path:
     """One line a reading; empty cells for what is not known, quality codes joined by blanks."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with path.open("w", newline="", encoding="utf-8", errors="replace") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
         writer.writerows(_rows(found))
