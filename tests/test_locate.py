@@ -31,6 +31,8 @@ def test_every_form_of_the_same_frame_gives_the_same_pose() -> None:
         (DEPTH.astype(np.float32), {}),
         (strided, {}),
         (raw, {"depth_unit": 0.0001}),
+        (raw.astype(np.int32), {"depth_unit": 0.0001}),
+        (np.round(DEPTH / 0.00001).astype(np.uint32), {"depth_unit": 0.00001}),
         (Frame(depth=raw, camera=CAMERA, depth_unit=0.0001), {}),
         (DEPTH.tolist(), {}),
         (points, {}),
@@ -67,12 +69,23 @@ BAD: dict[str, tuple[Any, dict[str, Any], type[SiloscopeError], str]] = {
     "another size": (np.ones((60, 80)), {}, InputError, "camera"),
     "mask of another shape": (DEPTH, {"mask": np.ones((2, 2), bool)}, InputError, "mask"),
     "empty box": (DEPTH, {"crop": (90, 91, 0, 1, 0, 1)}, InputError, "crop"),
-    "box inside out": (DEPTH, {"crop": (1, 0, 0, 1, 0, 1)}, InputError, "crop"),
+    "box inside out": (DEPTH, {"crop": (1, 0, 0, 1, 0, 1)}, UsageError, "crop"),
+    "raw with a unit of 0": (
+        Frame(depth=np.ones((120, 160), np.uint16), depth_unit=0.001),
+        {"depth_unit": 0.0},
+        InputError,
+        "unit",
+    ),
     "unknown method": (DEPTH, {"method": "magic"}, UsageError, "method"),
     "unknown sensor": (DEPTH, {"sensor": "magic"}, UsageError, "sensor"),
     "negative diameter": (DEPTH, {"diameter": -1.0}, UsageError, "diameter"),
+    "diameter in words": (DEPTH, {"diameter": "2.5"}, UsageError, "diameter"),
     "no gravity": (DEPTH, {"gravity": (0, 0, 0)}, UsageError, "gravity"),
+    "gravity in words": (DEPTH, {"gravity": "down"}, UsageError, "gravity"),
+    "endless gravity": (DEPTH, {"gravity": (1e308, 1e308, 1e308)}, UsageError, "gravity"),
+    "an accelerometer's reading": (DEPTH, {"gravity": (0.1, 0.2, -9.8)}, UsageError, "turn all three signs"),
     "no threads": (DEPTH, {"threads": 0}, UsageError, "threads"),
+    "threads that are none": (DEPTH, {"threads": float("nan")}, UsageError, "threads"),
 }
 
 

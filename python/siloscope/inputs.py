@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from siloscope import _core
 from siloscope.camera import Camera
-from siloscope.errors import InputError
+from siloscope.errors import InputError, UsageError
 from siloscope.frame import Frame
 from siloscope.sensors import SensorProfile
 
@@ -53,18 +53,22 @@ def prepare(
     InputError
         For what can't be used: a wrong type or shape, raw units without `depth_unit`, a missing camera or one of
         another size, floats that can't be metres, a mask of another shape, no valid measurement at all.
+    UsageError
+        For a crop box that is none.
     """
     frame = data if isinstance(data, Frame) else _frame(data, camera)
-    frame = replace(frame, camera=camera or frame.camera, depth_unit=depth_unit or frame.depth_unit)
+    frame = replace(
+        frame, camera=camera or frame.camera, depth_unit=frame.depth_unit if depth_unit is None else depth_unit
+    )
     config: dict[str, Any] = {"crop": None if crop is None else list(crop), "masked": mask is not None}
-    box = None if crop is None else _box(crop)
+    box = None if crop is None else crop_box(crop)
     if frame.points is not None:
         points = _points(frame.points, frame.source)
         kept = _mask(mask, frame.points.shape[:-1], frame.source)
         if kept is not None:
             points = points[kept.reshape(-1)]
         points = points[np.isfinite(points).all(axis=1)]
-        points = points if box is None else points[_inside(points, box)]
+        points = points if box is None else points[within(points, box)]
         _not_empty(len(points), frame.source)
         return Prepared(None, None, np.ascontiguousarray(points), frame.gravity, config)
     return _prepare_depth(frame, profile, mask, box, config)
@@ -96,7 +100,7 @@ def _prepare_depth(
     if box is not None:
         rays = chosen.rays()
         points = np.dstack([rays[..., 0] * depth, rays[..., 1] * depth, depth])
-        depth = np.where(_inside(points, box), depth, np.float32(0))
+        depth = np.where(within(points, box), depth, np.float32(0))
     if (kept is not None or box is not None) and not (depth > 0).any():
         raise InputError(f"{frame.source}: mask and crop leave no pixel with a depth; check them against the picture")
     return Prepared(np.ascontiguousarray(depth, np.float32), chosen, None, frame.gravity, config)
@@ -137,7 +141,7 @@ def metres(frame: Frame) -> NDArray[np.float32]:
     raw = depth.dtype.kind in "iu"
     unit = _unit(frame.depth_unit, frame.source) if raw else 1.0
     if raw and depth.dtype != np.uint16:
-        depth = np.where((depth > 0) & (depth < SENTINEL), depth, 0).astype(np.uint16)
+        depth, unit = _narrowed(depth, unit)
     elif not raw and depth.dtype not in (np.float32, np.float64):
         depth = depth.astype(np.float64)
     known, valid = _core.depth_metres(depth, unit)
@@ -146,6 +150,12 @@ def metres(frame: Frame) -> NDArray[np.float32]:
     if not valid and (depth != 0).any():
         raise InputError(f"{frame.source}: every depth is invalid (NaN, negative or {SENTINEL}); check the recording")
     return known
+
+
+def _narrowed(depth: NDArray[np.integer[Any]], unit: float) -> tuple[NDArray[Any], float]:
+    """Integers of another width as 16-bit raw units, or as metres where they don't fit; and the unit of either."""
+    measured = np.maximum(depth, 0)
+    return (measured.astype(np.uint16), unit) if measured.max() <= SENTINEL else (measured * unit, 1.0)
 
 
 def _not_millimetres(known: NDArray[np.float32], source: str) -> None:
@@ -199,14 +209,16 @@ def _mask(mask: ArrayLike | None, shape: tuple[int, ...], source: str) -> NDArra
     return kept
 
 
-def _box(crop: Sequence[float]) -> NDArray[np.float64]:
+def crop_box(crop: Sequence[float]) -> NDArray[np.float64]:
+    """``xmin, xmax, ymin, ymax, zmin, zmax`` as an array (6,); raises `UsageError` where they are no box."""
     box = np.asarray(crop, np.float64)
     if box.shape != (6,) or not np.isfinite(box).all() or (box[0::2] >= box[1::2]).any():
-        raise InputError(f"crop {list(crop)}: give xmin,xmax,ymin,ymax,zmin,zmax in metres, each min below its max")
+        raise UsageError(f"crop {list(crop)}: give xmin,xmax,ymin,ymax,zmin,zmax in metres, each min below its max")
     return box
 
 
-def _inside(points: NDArray[np.floating[Any]], box: NDArray[np.float64]) -> NDArray[np.bool_]:
+def within(points: NDArray[np.floating[Any]], box: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Which points (..., 3) lie in a box of `crop_box`; NaN lies nowhere."""
     inside: NDArray[np.bool_] = np.all((points >= box[0::2]) & (points <= box[1::2]), axis=-1)
     return inside
 

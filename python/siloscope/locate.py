@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -67,7 +66,7 @@ def locate(
     diameter : float, optional
         Inner diameter of the silo's cylinder in metres, which fixes the scale of a sensor that is not known.
     gravity : array (3,), optional
-        Direction of gravity in the camera frame, any length.
+        Direction of gravity in the camera frame, any length; z is positive, as the camera looks down.
     mask : array of bool, optional
         True where the silo is, of the frame's shape.
     crop : (xmin, xmax, ymin, ymax, zmin, zmax), optional
@@ -98,7 +97,7 @@ def locate(
     settings = Settings(
         profile,
         _bounded("diameter", diameter, 0.01, 200.0),
-        _direction(gravity),
+        _downwards(gravity),
         _bounded("grid", grid, 1e-4, 10.0),
         int(_whole("neighbours", neighbours, 6, 500)),
         int(_whole("threads", threads, 1, 256)),
@@ -152,21 +151,39 @@ def _config(method: str, prepared: Prepared, settings: Settings) -> dict[str, An
 def _bounded(name: str, value: Number, least: float, most: float) -> Number:
     if value is None:
         return None
-    if isinstance(value, bool) or not math.isfinite(value) or not least <= value <= most:
+    if not _is_number(value) or not least <= value <= most:
         raise UsageError(f"{name} must be between {least:g} and {most:g} m, got {value}")
     return float(value)
 
 
 def _whole(name: str, value: float, least: int, most: int) -> float:
-    if isinstance(value, bool) or value != int(value) or not least <= value <= most:
+    if not _is_number(value) or not least <= value <= most or value != int(value):
         raise UsageError(f"{name} must be a whole number between {least} and {most}, got {value}")
     return value
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float | np.integer | np.floating) and not isinstance(value, bool)
+
+
+def _downwards(gravity: ArrayLike | None) -> NDArray[np.float64] | None:
+    """Gravity as a caller gives it, who may mistake an accelerometer's reading for it."""
+    vector = _direction(gravity)
+    if vector is not None and vector[2] < 0.0:
+        raise UsageError(
+            f"gravity {vector.tolist()} points out of the camera's back; an accelerometer at rest reads minus gravity: "
+            "turn all three signs"
+        )
+    return vector
 
 
 def _direction(gravity: ArrayLike | None) -> NDArray[np.float64] | None:
     if gravity is None:
         return None
-    vector = np.asarray(gravity, np.float64)
-    if vector.shape != (3,) or not np.isfinite(vector).all() or not np.linalg.norm(vector) > 0:
+    try:
+        vector = np.asarray(gravity, np.float64)
+    except (TypeError, ValueError):
+        vector = np.empty(0)
+    if vector.shape != (3,) or not (np.abs(vector) < 1e100).all() or not np.linalg.norm(vector) > 0:
         raise UsageError(f"gravity must be three numbers, not all zero, got {gravity}")
     return vector

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.errors import InputError, UsageError
+from siloscope.errors import InputError
 from siloscope.frame import Frame
-from siloscope.inputs import metres
+from siloscope.inputs import crop_box, metres, within
 
 Mask = NDArray[np.bool_]
 
@@ -69,13 +69,8 @@ def label_mask(frame: Frame, label: int) -> Mask:
 
 def box_mask(frame: Frame, box: Sequence[float]) -> Mask:
     """The points or pixels inside ``xmin, xmax, ymin, ymax, zmin, zmax`` of the camera frame, metres."""
-    low, high = np.asarray(box[0::2], float), np.asarray(box[1::2], float)
-    if len(box) != 6 or not (np.isfinite(box).all() and (low < high).all()):
-        raise UsageError(f"crop {tuple(box)}: give xmin,xmax,ymin,ymax,zmin,zmax in metres, each min below its max")
     points = frame_points(frame)
-    with np.errstate(invalid="ignore"):
-        inside = ((points >= low) & (points <= high)).all(axis=-1)
-    return _some(inside, f"{frame.source}: no point lies in the crop box {_extent(points)}")
+    return _some(within(points, crop_box(box)), f"{frame.source}: no point lies in the crop box {_extent(points)}")
 
 
 def _some(mask: Any, complaint: str) -> Mask:

@@ -9,6 +9,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -81,11 +82,11 @@ def _report(kind: str, message: str, code: int, as_json: bool) -> int:
 
 
 def _make_streams_safe() -> None:
-    """A terminal that can't show "±" gets "?" instead of a crash; a stream that was closed swallows what it is given."""
+    """A terminal that can't show "±" gets "?" instead of a crash; a closed stream swallows what it is given."""
     for name in ("stdout", "stderr"):
         stream = getattr(sys, name)
         if stream is None:
-            setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))
         elif hasattr(stream, "reconfigure"):
             stream.reconfigure(errors="replace")
 
