@@ -38,8 +38,6 @@ pub fn cloud_patches(points: &[Vec3], grid: f64, workers: &Workers) -> Result<Pa
             measured: 0.0,
             origin: p,
             normal,
-            slopes: [0.0; 2],
-            ray_steps: [Vec3::zeros(); 2],
             sigma_normal: 1.5 * scatter / (reach * n.sqrt()).max(1e-12),
             scatter,
             count: 1.0,

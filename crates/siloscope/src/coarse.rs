@@ -238,11 +238,13 @@ fn likelihood(problem: &Problem, fit: &Fit) -> f64 {
 pub fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
     const ENOUGH: usize = 12;
     let placed = PlacedSurface::new(fit.surface);
-    let seen = (0..wall.len()).filter(|&i| wall[i]).filter_map(|i| problem.contact(fit, &placed, i));
-    let (cylinder, cone) = seen.fold((0, 0), |(cylinder, cone), e| match e.part {
-        Part::Cylinder => (cylinder + 1, cone),
-        Part::Cone => (cylinder, cone + 1),
-    });
+    let (mut cylinder, mut cone) = (0, 0);
+    for contact in (0..wall.len()).filter(|&i| wall[i]).filter_map(|i| problem.contact(fit, &placed, i)) {
+        *(if contact.part == Part::Cylinder { &mut cylinder } else { &mut cone }) += 1;
+        if cylinder.min(cone) >= ENOUGH {
+            return;
+        }
+    }
     if cone < ENOUGH && cylinder >= ENOUGH {
         fit.surface.cone = None;
     } else if cylinder < ENOUGH && cone >= ENOUGH {

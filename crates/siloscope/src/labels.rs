@@ -72,10 +72,11 @@ fn has_company(image: &DepthImage, (u, v): (usize, usize), reach: f64) -> bool {
 pub fn coverage(found: &SurfaceFit) -> Coverage {
     let placed = PlacedSurface::new(found.fit.surface);
     let mut coverage = Coverage::default();
-    for patch in &found.patches.list {
+    for (patch, rays) in found.patches.list.iter().zip(&found.patches.rays) {
         let label = label_of(found, &placed, &patch.q, patch.measured, true);
         let d = found.fit.bias.true_depth(patch.measured);
-        let pixel = patch.ray_steps[0].cross(&patch.ray_steps[1]).norm() * d * d;
+        let [along, down] = rays.steps(found.patches.side);
+        let pixel = along.cross(&down).norm() * d * d;
         coverage.counts[usize::from(label)] += patch.count;
         coverage.areas[usize::from(label)] += patch.count * pixel / facing(label, patch, &placed, d);
     }

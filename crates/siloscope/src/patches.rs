@@ -17,10 +17,6 @@ pub struct Patch {
     pub origin: Vec3,
     /// Unit normal towards the camera.
     pub normal: Vec3,
-    /// Change of the measured depth per pixel along the image's rows and columns (images).
-    pub slopes: [f64; 2],
-    /// Change of the ray per pixel along the image's rows and columns (images).
-    pub ray_steps: [Vec3; 2],
     /// Standard deviation of the normal's direction, radians.
     pub sigma_normal: f64,
     /// Scatter of the single measurements about the patch's plane, metres along `q`.
@@ -41,6 +37,17 @@ impl Patch {
     }
 }
 
+/// What only the tile of an image has: its rays, and how its depth changes.
+#[derive(Debug, Clone, Copy)]
+pub struct TileRays {
+    /// Rays `(x/z, y/z)` of the first row's first and last pixel, then of the last row's.
+    corners: [[f64; 2]; 4],
+    /// Ray of the centre.
+    centre: [f64; 2],
+    /// Change of the measured depth per pixel along the image's rows and columns.
+    slopes: [f64; 2],
+}
+
 /// No neighbour: outside the image, or without depth.
 pub const NONE: u32 = u32::MAX;
 
@@ -49,6 +56,8 @@ pub const NONE: u32 = u32::MAX;
 pub struct Patches {
     /// The patches.
     pub list: Vec<Patch>,
+    /// Their rays (images).
+    pub rays: Vec<TileRays>,
     /// The eight neighbours of each; `NONE` where there is none.
     pub neighbours: Vec<[u32; 8]>,
     /// Side of a tile in pixels (images).
@@ -75,13 +84,13 @@ pub struct DepthImage<'a> {
 impl DepthImage<'_> {
     /// Depths of up to N pixels from `start` on, 0 beyond `side`.
     #[inline(always)]
-    pub(crate) fn row<const N: usize>(&self, start: usize, side: usize) -> [f64; N] {
+    pub(crate) fn row<const N: usize>(&self, start: usize, side: usize) -> [f32; N] {
         let depths = &self.depth[start..start + side];
         let mut row = [0.0; N];
         if let Some(whole) = depths.first_chunk::<N>() {
-            row = whole.map(f64::from);
+            row = *whole;
         } else {
-            row.iter_mut().zip(depths).for_each(|(to, &from)| *to = f64::from(from));
+            row.iter_mut().zip(depths).for_each(|(to, &from)| *to = from);
         }
         row
     }
@@ -219,13 +228,15 @@ pub fn tile_patches(image: &DepthImage, noise: Option<&NoiseLaw>) -> Patches {
             *tile = Some(robust_tile(image, place(i), side).unwrap_or(rough));
         }
     }
-    let list = Vec::with_capacity(tiles.iter().flatten().count());
-    let mut patches = Patches { list, side, columns, ..Patches::default() };
+    let n = tiles.iter().flatten().count();
+    let (list, rays) = (Vec::with_capacity(n), Vec::with_capacity(n));
+    let mut patches = Patches { list, rays, side, columns, ..Patches::default() };
     let mut index = vec![NONE; columns * rows];
     for (i, index) in index.iter_mut().enumerate() {
-        if let Some(patch) = patch(image, &tiles, (i % columns, i / columns), (columns, rows), side) {
+        if let Some((patch, rays)) = patch(image, &tiles, (i % columns, i / columns), (columns, rows), side) {
             *index = patches.list.len() as u32;
             patches.list.push(patch);
+            patches.rays.push(rays);
         }
     }
     patches.neighbours = patches.list.iter().map(|p| neighbours(&index, p.tile, columns, rows)).collect();
@@ -340,7 +351,7 @@ fn patch(
     (column, row): (usize, usize),
     (columns, rows): (usize, usize),
     side: usize,
-) -> Option<Patch> {
+) -> Option<(Patch, TileRays)> {
     let tile = tiles[row * columns + column].as_ref()?;
     let Tile { sums: own, plane, scatter } = *tile;
     let depth = tile.depth();
@@ -366,24 +377,26 @@ fn patch(
     let wide = pooled.plane()?;
     let (mu, mv) = (own.u / own.n, own.v / own.n);
     let z = depth;
-    let (q, q_u, q_v) = ray_and_steps(image, column * side, row * side, side, (mu, mv));
-    let (normal, length) = normal_of(&q, z, [wide.b, wide.c], &[q_u, q_v])?;
+    let rays = TileRays::of(image, row * side * image.width + column * side, side, [wide.b, wide.c]);
+    let steps = rays.steps(side);
+    let [q_u, q_v] = &steps;
+    let q = rays.mean() + q_u * mu + q_v * mv;
+    let (normal, length) = normal_of(&q, z, rays.slopes, &steps)?;
     let spread = (pooled.uu - pooled.u * pooled.u / pooled.n).min(pooled.vv - pooled.v * pooled.v / pooled.n);
     let sigma_slope = scatter / spread.max(1e-9).sqrt();
     let sigma_normal = sigma_slope * z * (q_u.norm() + q_v.norm()) / 1.4 / length;
-    Some(Patch {
+    let patch = Patch {
         q,
         measured: z,
         origin: Vec3::zeros(),
         normal,
-        slopes: [wide.b, wide.c],
-        ray_steps: [q_u, q_v],
         sigma_normal,
         scatter,
         count: own.n,
         smooth: joined >= 3 && own.n >= 0.5 * step * step,
         tile: (column as u32, row as u32),
-    })
+    };
+    Some((patch, rays))
 }
 
 /// Normal of the surface with depth z and slopes on ray q, towards the camera; and the length of the tangents' product.
@@ -397,32 +410,67 @@ fn normal_of(q: &Vec3, z: f64, slopes: [f64; 2], steps: &[Vec3; 2]) -> Option<(V
 impl Patches {
     /// Works out the normals again for depths freed from their bias.
     pub fn unbias_normals(&mut self, bias: &DepthBias) {
-        for patch in &mut self.list {
+        for (patch, rays) in self.list.iter_mut().zip(&self.rays) {
             let d = bias.true_depth(patch.measured);
             let slope = bias.slope(d);
-            let slopes = patch.slopes.map(|s| s / slope);
-            if let Some((normal, _)) = normal_of(&patch.q, d, slopes, &patch.ray_steps) {
+            let slopes = rays.slopes.map(|s| s / slope);
+            if let Some((normal, _)) = normal_of(&patch.q, d, slopes, &rays.steps(self.side)) {
                 patch.normal = normal;
             }
         }
     }
 }
 
-/// Ray at the centroid (mu, mv) of a tile, and its change per pixel along u and v.
-fn ray_and_steps(image: &DepthImage, u0: usize, v0: usize, side: usize, (mu, mv): (f64, f64)) -> (Vec3, Vec3, Vec3) {
-    let at = |u: usize, v: usize| image.rays[v * image.width + u];
-    let last = side - 1;
-    let (nw, ne) = (at(u0, v0), at(u0 + last, v0));
-    let (sw, se) = (at(u0, v0 + last), at(u0 + last, v0 + last));
-    let span = 2.0 * last as f64;
-    let step = |k: usize| ((ne[k] + se[k] - nw[k] - sw[k]) / span, (sw[k] + se[k] - nw[k] - ne[k]) / span);
-    let ((xu, xv), (yu, yv)) = (step(0), step(1));
-    let mean = |k: usize| (nw[k] + ne[k] + sw[k] + se[k]) / 4.0;
-    (
-        Vec3::new(mean(0) + xu * mu + xv * mv, mean(1) + yu * mu + yv * mv, 1.0),
-        Vec3::new(xu, yu, 0.0),
-        Vec3::new(xv, yv, 0.0),
-    )
+impl TileRays {
+    /// Of the tile whose first pixel is `corner`.
+    #[inline]
+    fn of(image: &DepthImage, corner: usize, side: usize, slopes: [f64; 2]) -> Self {
+        let last = side - 1;
+        let at = |u: usize, v: usize| image.rays[corner + v * image.width + u];
+        let (p, q) = (at(last / 2, last / 2), at(last.div_ceil(2), last.div_ceil(2)));
+        Self {
+            corners: [at(0, 0), at(last, 0), at(0, last), at(last, last)],
+            centre: [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])],
+            slopes,
+        }
+    }
+
+    /// Mean of the corners' rays.
+    fn mean(&self) -> Vec3 {
+        let [nw, ne, sw, se] = &self.corners;
+        let mean = |k: usize| 0.25 * (nw[k] + ne[k] + sw[k] + se[k]);
+        Vec3::new(mean(0), mean(1), 1.0)
+    }
+
+    /// Change of the ray per pixel along the image's rows and columns.
+    pub fn steps(&self, side: usize) -> [Vec3; 2] {
+        let [nw, ne, sw, se] = &self.corners;
+        let scale = 0.5 / (side - 1) as f64;
+        let along = |k: usize| scale * (ne[k] + se[k] - nw[k] - sw[k]);
+        let down = |k: usize| scale * (sw[k] + se[k] - nw[k] - ne[k]);
+        [Vec3::new(along(0), along(1), 0.0), Vec3::new(down(0), down(1), 0.0)]
+    }
+
+    /// Rays of the corners, the middles of the sides, and the centre, row by row.
+    ///
+    /// A distorted lens bends the lines between corners: the middle of a side is taken as half as far off the straight
+    /// line as the centre is off the corners' mean.
+    #[inline(always)]
+    pub fn nodes(&self) -> [[f64; 2]; 9] {
+        let [nw, ne, sw, se] = self.corners;
+        let mean = self.mean();
+        let bow = [0.5 * (self.centre[0] - mean.x), 0.5 * (self.centre[1] - mean.y)];
+        let between = |p: [f64; 2], q: [f64; 2]| [0.5 * (p[0] + q[0]) + bow[0], 0.5 * (p[1] + q[1]) + bow[1]];
+        [nw, between(nw, ne), ne, between(nw, sw), self.centre, between(ne, se), sw, between(sw, se), se]
+    }
+
+    /// Two places between the nodes, on the diagonal: their row and column, and their ray.
+    #[inline(always)]
+    pub fn probes(&self, side: usize) -> [(f32, [f64; 2]); 2] {
+        let last = (side - 1) as f32;
+        let towards = |corner: [f64; 2]| [0.5 * (corner[0] + self.centre[0]), 0.5 * (corner[1] + self.centre[1])];
+        [(0.25 * last, towards(self.corners[0])), (0.75 * last, towards(self.corners[3]))]
+    }
 }
 
 fn neighbours(index: &[u32], (column, row): (u32, u32), columns: usize, rows: usize) -> [u32; 8] {

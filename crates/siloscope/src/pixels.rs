@@ -1,6 +1,6 @@
 //! The last step's residuals: every pixel of the wall's tiles against the exact ray–surface intersection.
 
-use crate::patches::{DepthImage, MAX_SIDE, Patches};
+use crate::patches::{DepthImage, MAX_SIDE, Patches, TileRays};
 use crate::sensor::DepthBias;
 use crate::surface::{Part, PlacedSurface};
 
@@ -35,7 +35,7 @@ pub fn tile_residual(
 ) -> TileResidual {
     let (tile, side) = (patches.list[i].tile, patches.side);
     let corner = tile.1 as usize * side * image.width + tile.0 as usize * side;
-    let tile = Tile { image, corner, side, bias, sampling };
+    let tile = Tile { image, corner, side, rays: &patches.rays[i], bias, sampling };
     match (part, placed.surface.ovality == [0.0; 2]) {
         (Part::Cylinder, true) => tile.residual(placed, part, |q| placed.cylinder_depth(q)),
         (Part::Cone, true) => tile.residual(placed, part, |q| placed.cone_depth(q)),
@@ -48,6 +48,7 @@ struct Tile<'a> {
     image: &'a DepthImage<'a>,
     corner: usize,
     side: usize,
+    rays: &'a TileRays,
     bias: &'a DepthBias,
     sampling: Sampling,
 }
@@ -60,66 +61,53 @@ const QUADRATIC_REST: f64 = 5e-5;
 impl Tile<'_> {
     #[inline(always)]
     fn residual(&self, placed: &PlacedSurface, part: Part, depth: impl Fn([f64; 2]) -> f64) -> TileResidual {
-        let Some(nodes) = self.nodes(placed, part, &depth) else { return TileResidual::default() };
-        let seen = |u: usize, v: usize| self.bias.measured(depth(self.ray(u, v)));
-        let smooth = Quadratic::through(&nodes.map(|row| row.map(|d| self.bias.measured(d))), self.side);
-        let rest = |at: usize| (smooth.row(at).value(at as f64) - seen(at, at)).abs();
-        if rest(self.side / 4) > QUADRATIC_REST || rest(self.side - 1 - self.side / 4) > QUADRATIC_REST {
-            let exact = |v: usize| std::array::from_fn(|u| if u < self.side { seen(u, v) } else { f64::NAN });
-            return self.mean::<MAX_SIDE>(exact);
+        let on_part = |ray: [f64; 2], d: f64| (placed.down(ray) * d < placed.bottom()) == (part == Part::Cylinder);
+        let (mut nodes, mut whole) = ([0.0; 9], true);
+        for (measured, ray) in nodes.iter_mut().zip(self.rays.nodes()) {
+            let d = depth(ray);
+            whole &= d > 0.0 && on_part(ray, d);
+            *measured = self.bias.measured(d);
+        }
+        if !whole {
+            return TileResidual::default();
+        }
+        let base = nodes[4] as f32;
+        let above = |measured: f64| (measured - f64::from(base)) as f32;
+        let seen = |ray: [f64; 2]| above(self.bias.measured(depth(ray)));
+        let smooth = Quadratic::through(&nodes, base, self.side);
+        let rest = |(at, ray): (f32, [f64; 2])| f64::from((smooth.row(at).value(at) - seen(ray)).abs());
+        if self.rays.probes(self.side).into_iter().any(|probe| rest(probe) > QUADRATIC_REST) {
+            let seen = |u: usize, v: usize| seen(self.image.rays[self.corner + v * self.image.width + u]);
+            let exact = |v: usize| std::array::from_fn(|u| if u < self.side { seen(u, v) } else { f32::NAN });
+            return self.mean::<MAX_SIDE>(base, exact);
         }
         if self.side <= MAX_SIDE / 2 {
-            self.mean::<{ MAX_SIDE / 2 }>(|v| smooth.row(v).values())
+            self.mean::<{ MAX_SIDE / 2 }>(base, |v| smooth.row(v as f32).values())
         } else {
-            self.mean::<MAX_SIDE>(|v| smooth.row(v).values())
+            self.mean::<MAX_SIDE>(base, |v| smooth.row(v as f32).values())
         }
     }
 
-    /// True depths of the wall at the tile's corners, middles of its sides, and centre; `None` where not all are `part`.
+    /// Mean of the residuals that agree with what the wall measures in each row, in metres above `base`.
+    ///
+    /// Above a depth of the same tile, single precision resolves some nanometres.
     #[inline(always)]
-    fn nodes(&self, placed: &PlacedSurface, part: Part, depth: &impl Fn([f64; 2]) -> f64) -> Option<[[f64; 3]; 3]> {
-        let last = self.side - 1;
-        let places = [(0, 0), (last / 2, last.div_ceil(2)), (last, last)];
-        let ray = |(u0, u1), (v0, v1)| {
-            let (p, q) = (self.ray(u0, v0), self.ray(u1, v1));
-            [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])]
-        };
-        let on_part = |ray: [f64; 2], d: f64| (placed.down(ray) * d < placed.bottom()) == (part == Part::Cylinder);
-        let mut nodes = [[0.0; 3]; 3];
-        for (row, v) in nodes.iter_mut().zip(places) {
-            for (node, u) in row.iter_mut().zip(places) {
-                let ray = ray(u, v);
-                *node = depth(ray);
-                if !(*node > 0.0 && on_part(ray, *node)) {
-                    return None;
-                }
-            }
-        }
-        Some(nodes)
-    }
-
-    #[inline(always)]
-    fn ray(&self, u: usize, v: usize) -> [f64; 2] {
-        self.image.rays[self.corner + v * self.image.width + u]
-    }
-
-    /// Mean of the residuals that agree with what the wall measures in each row.
-    #[inline(always)]
-    fn mean<const N: usize>(&self, wall: impl Fn(usize) -> [f64; N]) -> TileResidual {
-        let (mut count, mut sum, mut squares) = ([0.0; N], [0.0; N], [0.0; N]);
+    fn mean<const N: usize>(&self, base: f32, wall: impl Fn(usize) -> [f32; N]) -> TileResidual {
+        let reach = self.sampling.reach as f32;
+        let (mut count, mut sum, mut squares) = ([0.0f32; N], [0.0f32; N], [0.0f32; N]);
         for v in (0..self.side).step_by(self.sampling.stride) {
             let depths = self.image.row::<N>(self.corner + v * self.image.width, self.side);
             let wall = wall(v);
             for u in 0..N {
-                let residual = depths[u] - wall[u];
-                let counts = (depths[u] > 0.0) & (residual.abs() < self.sampling.reach);
+                let residual = (depths[u] - base) - wall[u];
+                let counts = (depths[u] > 0.0) & (residual.abs() < reach);
                 let kept = if counts { residual } else { 0.0 };
                 count[u] += if counts { 1.0 } else { 0.0 };
                 sum[u] += kept;
                 squares[u] += kept * kept;
             }
         }
-        let [n, sum, squares] = [count, sum, squares].map(|lanes| lanes.iter().sum::<f64>());
+        let [n, sum, squares] = [count, sum, squares].map(|lanes| lanes.iter().map(|&of| f64::from(of)).sum::<f64>());
         if n < 3.0 {
             return TileResidual::default();
         }
@@ -132,51 +120,55 @@ impl Tile<'_> {
 struct Quadratic {
     /// Along u, of the rows v = 0, (side − 1)/2 and side − 1.
     rows: [Parabola; 3],
-    last: f64,
+    last: f32,
 }
 
 /// a + b·u + c·u².
 #[derive(Clone, Copy)]
 struct Parabola {
-    a: f64,
-    b: f64,
-    c: f64,
+    a: f32,
+    b: f32,
+    c: f32,
 }
 
 impl Parabola {
     /// Through the values at 0, `last`/2 and `last`.
     #[inline(always)]
-    fn through([start, middle, end]: [f64; 3], last: f64) -> Self {
+    fn through([start, middle, end]: [f32; 3], last: f32) -> Self {
         let c = 2.0 * (start - 2.0 * middle + end) / (last * last);
         Self { a: start, b: (end - start) / last - c * last, c }
     }
 
     #[inline(always)]
-    fn value(&self, u: f64) -> f64 {
+    fn value(&self, u: f32) -> f32 {
         self.a + u * (self.b + u * self.c)
     }
 
     #[inline(always)]
-    fn values<const N: usize>(&self) -> [f64; N] {
-        std::array::from_fn(|u| self.value(u as f64))
+    fn values<const N: usize>(&self) -> [f32; N] {
+        std::array::from_fn(|u| self.value(u as f32))
     }
 }
 
 impl Quadratic {
     #[inline(always)]
-    fn through(nodes: &[[f64; 3]; 3], side: usize) -> Self {
-        let last = (side - 1) as f64;
-        Self { rows: nodes.map(|row| Parabola::through(row, last)), last }
+    fn through(nodes: &[f64; 9], base: f32, side: usize) -> Self {
+        let last = (side - 1) as f32;
+        let above = |node: usize| (nodes[node] - f64::from(base)) as f32;
+        let row = |v: usize| Parabola::through([above(3 * v), above(3 * v + 1), above(3 * v + 2)], last);
+        Self { rows: [row(0), row(1), row(2)], last }
     }
 
     /// Along u at row v.
     #[inline(always)]
-    fn row(&self, v: usize) -> Parabola {
-        let t = 2.0 * v as f64 / self.last - 1.0; // −1, 0 and 1 at the three rows
+    fn row(&self, v: f32) -> Parabola {
+        let t = 2.0 * v / self.last - 1.0; // −1, 0 and 1 at the three rows
         let [north, middle, south] = [0.5 * t * (t - 1.0), 1.0 - t * t, 0.5 * t * (t + 1.0)];
-        let of = |part: fn(&Parabola) -> f64| {
-            north * part(&self.rows[0]) + middle * part(&self.rows[1]) + south * part(&self.rows[2])
-        };
-        Parabola { a: of(|p| p.a), b: of(|p| p.b), c: of(|p| p.c) }
+        let [first, second, third] = &self.rows;
+        Parabola {
+            a: north * first.a + middle * second.a + south * third.a,
+            b: north * first.b + middle * second.b + south * third.b,
+            c: north * first.c + middle * second.c + south * third.c,
+        }
     }
 }

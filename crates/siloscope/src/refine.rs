@@ -72,6 +72,9 @@ pub struct Problem<'a> {
     pub pixel: f64,
 }
 
+/// The first so many parameters are those of a round silo, without the depth bias.
+const SURFACE: usize = 7;
+
 /// Smallest misfit assumed, metres: what rounding in the tiles' own means amounts to.
 const MISFIT_FLOOR: f64 = 2e-4;
 /// Residuals beyond this many standard deviations have no weight (Tukey's constant).
@@ -92,8 +95,7 @@ pub struct Contact {
     d: f64,
     p: Vec3,
     at: Local,
-    /// Length of the gradient, and change of the residual per change of the implicit function.
-    length: f64,
+    /// Change of the residual per change of the implicit function.
     rate: f64,
 }
 
@@ -111,10 +113,9 @@ impl Problem<'_> {
         let cloud = self.patches.cloud;
         let turned = placed.turn(&patch.q);
         let at = if cloud { placed.local(&patch.origin) } else { placed.local_along(&turned, d) };
-        let length = at.gradient.norm();
-        let q = if cloud { at.gradient / length } else { turned };
+        let q = if cloud { at.gradient.normalize() } else { turned };
         let along = at.gradient.dot(&q);
-        let (full, inverse) = (length * q.norm(), 1.0 / along);
+        let (full, inverse) = ((at.gradient.norm_squared() * q.norm_squared()).sqrt(), 1.0 / along);
         let cosine = along / full;
         let half = 0.5 * self.pixel * self.patches.side as f64 * d; // of the tile, before it is stretched by 1/cosine
         if cosine.is_nan() || cosine.abs() < 0.02 || (at.p.z - placed.bottom()).abs() * cosine.abs() < half {
@@ -125,17 +126,7 @@ impl Problem<'_> {
         let misfit = fit.misfit * full * inverse;
         let variance = sigma * sigma / patch.count + misfit * misfit;
         let cosine = cosine.abs();
-        Some(Contact {
-            residual: rate * at.value,
-            variance,
-            cosine,
-            part: at.part,
-            d,
-            p: patch.at(d),
-            at,
-            length,
-            rate,
-        })
+        Some(Contact { residual: rate * at.value, variance, cosine, part: at.part, d, p: patch.at(d), at, rate })
     }
 
     /// The equation of patch `i`; `None` where its ray runs along the wall or it straddles the joint.
@@ -171,7 +162,7 @@ impl Problem<'_> {
         if by_residual <= 0.0 || !patch.smooth {
             return 0.0;
         }
-        let facing = placed.turn(&patch.normal).dot(&contact.at.gradient) / contact.length;
+        let facing = placed.turn(&patch.normal).dot(&contact.at.gradient) / contact.at.gradient.norm();
         let agreement = match (self.patches.cloud, fit.inside) {
             (true, _) => facing.abs(),
             (false, true) => -facing,
@@ -192,6 +183,7 @@ impl Problem<'_> {
     fn step(&self, fit: &mut Fit, stride: usize, angle: f64) {
         let placed = PlacedSurface::new(fit.surface);
         let mut system = System::with_prior(self.prior, fit);
+        let bias_is_pinned = self.prior.bias_std == [0.0; 3] && self.prior.ovality_std == 0.0;
         let mut across: Vec<f64> = Vec::with_capacity(self.patches.list.len() / stride + 1);
         let (mut cylinder, mut cone, mut noise) = (0.0, 0.0, 0.0);
         fit.weights.iter_mut().for_each(|w| *w = 0.0);
@@ -202,7 +194,12 @@ impl Problem<'_> {
                 continue;
             }
             fit.weights[i] = weight;
-            system.add(&self.equation_of(&placed, &contact), weight);
+            let equation = self.equation_of(&placed, &contact);
+            if bias_is_pinned {
+                system.add_leading::<SURFACE>(&equation.jacobian, equation.residual, weight / equation.variance);
+            } else {
+                system.add(&equation, weight);
+            }
             let Contact { residual, variance, cosine, part, .. } = contact;
             across.push((residual * cosine).abs());
             noise += (variance * cosine * cosine - fit.misfit * fit.misfit).max(0.0);
@@ -350,15 +347,22 @@ impl System {
     /// Adds a residual with its derivative and its information.
     #[inline]
     pub fn add_row(&mut self, jacobian: &Parameters, residual: f64, information: f64) {
+        self.add_leading::<PARAMETERS>(jacobian, residual, information);
+    }
+
+    /// The same for the first N parameters alone.
+    #[inline(always)]
+    fn add_leading<const N: usize>(&mut self, jacobian: &Parameters, residual: f64, information: f64) {
         let j: &[f64; PARAMETERS] = &jacobian.data.0[0];
         let h: &mut [[f64; PARAMETERS]; PARAMETERS] = &mut self.information.data.0;
-        for k in 0..PARAMETERS {
+        let g: &mut [f64; PARAMETERS] = &mut self.gradient.data.0[0];
+        for k in 0..N {
             let factor = information * j[k];
-            for (entry, &of_row) in h[k][k..].iter_mut().zip(&j[k..]) {
-                *entry += factor * of_row;
+            for l in k..N {
+                h[k][l] += factor * j[l];
             }
+            g[k] += factor * residual;
         }
-        self.gradient += jacobian * (information * residual);
     }
 
     /// H with unit information on the parameters that are not free, scaled to a unit diagonal; the scale; who is free.

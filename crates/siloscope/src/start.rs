@@ -30,13 +30,26 @@ impl Oriented {
     fn cosine(&self, cosine: f64) -> f64 {
         if self.signed { cosine } else { cosine.abs() }
     }
+}
 
-    /// Distance from the z-axis, and the normal's radial and axial parts with the radial one turned inwards if unsigned.
-    fn meridian(&self) -> (f64, f64, f64) {
-        let rho = (self.p.x * self.p.x + self.p.y * self.p.y).sqrt().max(1e-9);
-        let n_rho = (self.n.x * self.p.x + self.n.y * self.p.y) / rho;
-        let turn = if !self.signed && n_rho > 0.0 { -1.0 } else { 1.0 };
-        (rho, turn * n_rho, turn * self.n.z)
+/// A patch in the plane through the silo's axis and itself, where the wall is a line.
+#[derive(Debug, Clone, Copy)]
+struct InProfile {
+    rho: f64,
+    z: f64,
+    /// The normal's radial and axial parts; the radial one is turned inwards where the sign is unknown.
+    n_rho: f64,
+    n_z: f64,
+    of: Oriented,
+}
+
+impl InProfile {
+    /// Of a patch in the silo frame.
+    fn new(of: Oriented) -> Self {
+        let rho = (of.p.x * of.p.x + of.p.y * of.p.y).sqrt().max(1e-9);
+        let n_rho = (of.n.x * of.p.x + of.n.y * of.p.y) / rho;
+        let turn = if !of.signed && n_rho > 0.0 { -1.0 } else { 1.0 };
+        Self { rho, z: of.p.z, n_rho: turn * n_rho, n_z: turn * of.n.z, of }
     }
 }
 
@@ -272,8 +285,7 @@ fn soft(distance: f64, reach: f64, cosine: f64, angle: f64) -> f64 {
 /// The hypothesis as it is, and with the other part of the silo where patches ask for one.
 fn complete(h: &Hypothesis, sample: &[Oriented]) -> Vec<Start> {
     let pose = SiloPose::from_axis(&h.x, &h.a);
-    let turn = pose.rotation();
-    let local: Vec<Oriented> = sample.iter().map(|o| Oriented { p: pose.to_silo(&o.p), n: turn * o.n, ..*o }).collect();
+    let local = in_profile(&pose, sample);
     let alone = match h.shape {
         Shape::Cylinder { radius, inside } => {
             (SiloSurface { pose, radius: Some(radius), cone: None, ovality: [0.0; 2] }, inside)
@@ -299,7 +311,7 @@ fn complete(h: &Hypothesis, sample: &[Oriented]) -> Vec<Start> {
 
 /// The surface with the part that it lacks, where patches (camera frame) ask for one.
 pub fn other_part(surface: &SiloSurface, patches: &[Oriented]) -> Option<SiloSurface> {
-    let local = in_silo(&surface.pose, &thinned(patches, 3 * SCORED));
+    let local = in_profile(&surface.pose, &thinned(patches, 3 * SCORED));
     if surface.cone.is_none() {
         best_cone(surface, STEEPEST..SHALLOWEST, FINE_REACH, &local)
     } else {
@@ -309,32 +321,33 @@ pub fn other_part(surface: &SiloSurface, patches: &[Oriented]) -> Option<SiloSur
 
 /// The surface with another cone, of less than `slope`, in place of its own, where patches (camera frame) ask for one.
 pub fn steeper_cone(surface: &SiloSurface, slope: f64, patches: &[Oriented]) -> Option<SiloSurface> {
-    let local = in_silo(&surface.pose, &thinned(patches, 3 * SCORED));
+    let local = in_profile(&surface.pose, &thinned(patches, 3 * SCORED));
     best_cone(&SiloSurface { cone: None, ..*surface }, STEEPEST..slope, FINE_REACH, &local)
 }
 
-fn in_silo(pose: &SiloPose, patches: &[Oriented]) -> Vec<Oriented> {
+fn in_profile(pose: &SiloPose, patches: &[Oriented]) -> Vec<InProfile> {
     let turn = pose.rotation();
-    patches.iter().map(|o| Oriented { p: pose.to_silo(&o.p), n: turn * o.n, ..*o }).collect()
+    let place = |o: &Oriented| InProfile::new(Oriented { p: pose.to_silo(&o.p), n: turn * o.n, ..*o });
+    patches.iter().map(place).collect()
 }
 
 /// Soft count of the patches (silo frame) that agree with a surface about the z-axis.
-fn profile_score(s: &SiloSurface, inside: bool, reach: f64, local: &[Oriented]) -> f64 {
+fn profile_score(s: &SiloSurface, inside: bool, reach: f64, local: &[InProfile]) -> f64 {
     local.iter().map(|o| profile_agreement(s, inside, reach, o)).sum()
 }
 
-fn profile_agreement(s: &SiloSurface, inside: bool, reach: f64, o: &Oriented) -> f64 {
-    let (rho, n_rho, n_z) = o.meridian();
+fn profile_agreement(s: &SiloSurface, inside: bool, reach: f64, seen: &InProfile) -> f64 {
+    let InProfile { rho, z, n_rho, n_z, of } = seen;
     let side = if inside { -1.0 } else { 1.0 };
     match (s.radius, s.cone) {
-        (Some(radius), cone) if cone.is_none() || o.p.z < s.cylinder_bottom() => {
-            soft(rho - radius, reach * radius + o.slack, o.cosine(side * n_rho), o.angle)
+        (Some(radius), cone) if cone.is_none() || *z < s.cylinder_bottom() => {
+            soft(rho - radius, reach * radius + of.slack, of.cosine(side * n_rho), of.angle)
         }
         (_, Some(cone)) => {
             let c = 1.0 / (1.0 + cone.slope * cone.slope).sqrt();
-            let distance = (rho - cone.slope * (cone.apex - o.p.z)) * c;
-            let cosine = o.cosine(-c * (n_rho + cone.slope * n_z));
-            soft(distance, reach * rho + o.slack, cosine, o.angle)
+            let distance = (rho - cone.slope * (cone.apex - z)) * c;
+            let cosine = of.cosine(-c * (n_rho + cone.slope * n_z));
+            soft(distance, reach * rho + of.slack, cosine, of.angle)
         }
         _ => 0.0,
     }
@@ -346,13 +359,12 @@ fn best_cone(
     cylinder: &SiloSurface,
     slopes: std::ops::Range<f64>,
     reach: f64,
-    local: &[Oriented],
+    local: &[InProfile],
 ) -> Option<SiloSurface> {
     let radius = cylinder.radius.unwrap_or(f64::INFINITY);
-    let proposals = local.iter().filter_map(|o| {
-        let (rho, n_rho, n_z) = o.meridian();
+    let proposals = local.iter().filter_map(|&InProfile { rho, z, n_rho, n_z, .. }| {
         let slope = n_z / n_rho;
-        let cone = Cone { slope, apex: o.p.z + rho / slope };
+        let cone = Cone { slope, apex: z + rho / slope };
         let meridian = n_rho.hypot(n_z) > 0.97;
         let possible = n_rho < 0.0 && slopes.contains(&slope) && rho < 0.97 * radius && meridian;
         possible.then_some(SiloSurface { cone: Some(cone), ..*cylinder })
@@ -361,16 +373,19 @@ fn best_cone(
 }
 
 /// Above a known cone, the cylinder that most patches agree with; each patch proposes its own radius.
-fn best_cylinder(cone: &SiloSurface, reach: f64, local: &[Oriented]) -> Option<SiloSurface> {
-    let proposals = local.iter().filter_map(|o| {
-        let (rho, n_rho, _) = o.meridian();
-        (n_rho < -0.97).then_some(SiloSurface { radius: Some(rho), ..*cone })
-    });
+fn best_cylinder(cone: &SiloSurface, reach: f64, local: &[InProfile]) -> Option<SiloSurface> {
+    let proposals =
+        local.iter().filter_map(|seen| (seen.n_rho < -0.97).then_some(SiloSurface { radius: Some(seen.rho), ..*cone }));
     best(proposals, profile_score(cone, true, reach, local), reach, local)
 }
 
 /// The proposal with the best score, where it beats the score without it.
-fn best(proposals: impl Iterator<Item = SiloSurface>, bar: f64, reach: f64, local: &[Oriented]) -> Option<SiloSurface> {
+fn best(
+    proposals: impl Iterator<Item = SiloSurface>,
+    bar: f64,
+    reach: f64,
+    local: &[InProfile],
+) -> Option<SiloSurface> {
     const TRIED: usize = 60;
     let proposals: Vec<SiloSurface> = proposals.collect();
     let mut found = None;
@@ -385,7 +400,7 @@ fn best(proposals: impl Iterator<Item = SiloSurface>, bar: f64, reach: f64, loca
 }
 
 /// The score of a surface seen from inside, where it beats `bar`; ends as soon as it no longer can.
-fn score_above(bar: f64, s: &SiloSurface, reach: f64, local: &[Oriented]) -> Option<f64> {
+fn score_above(bar: f64, s: &SiloSurface, reach: f64, local: &[InProfile]) -> Option<f64> {
     const RUN: usize = 32;
     let (mut total, mut left) = (0.0, local.len());
     for run in local.chunks(RUN) {
