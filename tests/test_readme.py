@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from siloscope import sensors
 from siloscope.cli import main
 from siloscope.demo import SCENE, write_frame
 
@@ -53,6 +54,16 @@ def test_python_works(
     monkeypatch.chdir(place)
     exec(compile(code, "README.md", "exec"), {})
     assert "None" not in capsys.readouterr().out
+
+
+def test_the_sensor_profile_is_one(tmp_path: Path) -> None:
+    (printed,) = blocks("toml", "docs/your-frame.md")
+    file = tmp_path / "sensor.toml"
+    file.write_text(printed, "utf-8")
+    profile = sensors.load(file)
+    assert profile.bias == (0.002, -0.004, 0.003)
+    assert profile.sigma(2.0) == pytest.approx(0.0048)
+    assert profile.camera(640, 480) is not None
 
 
 def test_json_has_the_keys_of_a_real_answer(

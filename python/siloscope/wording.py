@@ -16,5 +16,5 @@ def with_std(value: float | None, std: float | None, factor: float, unit: str) -
 
 
 def printable(name: str) -> str:
-    """A file's name as text that every encoding of Unicode takes: bytes that are none, as in old archives, become "?"."""
+    """A file's name as text that can be encoded: bytes in it that are no UTF-8, as in old archives, become "?"."""
     return name.encode("utf-8", "replace").decode("utf-8")

@@ -18,6 +18,8 @@ __all__ = ["UNKNOWN", "SensorProfile", "load", "names"]
 BIAS = ("offset", "scale", "quadratic")
 NOISE = ("floor", "constant", "linear", "quadratic", "power_factor", "power")
 POWER = 2.0
+STEEPEST = 10.0
+"""Largest power of a noise law; sensors have 1 to 3."""
 LARGEST_FILE = 100_000
 """Bytes; a profile is a page of text."""
 
@@ -110,7 +112,7 @@ def load(sensor: str | Path | SensorProfile | None) -> SensorProfile:
 def _content(path: Path) -> bytes:
     try:
         if path.stat().st_size > LARGEST_FILE:
-            raise InputError(f"{path}: too large for a sensor profile; give a TOML file like those of the manual")
+            raise InputError(f"{path}: too large for a sensor profile; docs/your-frame.md has an example")
         return path.read_bytes()
     except OSError as error:
         raise InputError(f"{path}: can't be read ({error.strerror}); check its name and permissions") from None
@@ -120,13 +122,13 @@ def _parse(content: bytes, source: str) -> SensorProfile:
     try:
         table = tomllib.loads(content.decode())
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{source}: no TOML sensor profile ({error}); see the manual's page on sensors") from None
+        raise InputError(f"{source}: no TOML sensor profile ({error}); docs/your-frame.md has an example") from None
     known = {"name", "source", "range", "depth_unit", "bias", "noise", "intrinsics"}
     _only(table, known, source)
     bias, noise = _table(table, "bias", source), _table(table, "noise", source)
     _only(bias, {*BIAS, *(f"{key}_std" for key in BIAS)}, f"{source}: [bias]")
     _only(noise, set(NOISE), f"{source}: [noise]")
-    near, far = (_number(value, f"{source}: range") for value in table.get("range", [0.0, 1e6]))
+    near, far = _range(table.get("range", [0.0, 1e6]), source)
     offset, scale, quadratic = (_number(bias.get(key, 0.0), f"{source}: bias.{key}") for key in BIAS)
     stds = [_number(bias.get(f"{key}_std", 0.0), f"{source}: bias.{key}_std", 0.0) for key in BIAS]
     law = [_number(noise.get(key, POWER if key == "power" else 0.0), f"{source}: noise.{key}") for key in NOISE]
@@ -139,16 +141,25 @@ def _parse(content: bytes, source: str) -> SensorProfile:
         range=(near, far),
         depth_unit=None if unit is None else _number(unit, f"{source}: depth_unit", 1e-9),
         source=str(table.get("source", "")),
-        intrinsics=tuple(_camera(entry, source) for entry in table.get("intrinsics", [])),
+        intrinsics=_cameras(table.get("intrinsics", []), source),
     )
     _plausible(profile, source)
     return profile
+
+
+def _range(value: Any, source: str) -> tuple[float, float]:
+    if not isinstance(value, list) or len(value) != 2:
+        raise InputError(f"{source}: range must be [nearest, farthest] in metres, got {value!r}")
+    near, far = (_number(depth, f"{source}: range") for depth in value)
+    return near, far
 
 
 def _plausible(profile: SensorProfile, source: str) -> None:
     """Noise must be positive and measured depth must grow with true depth over the sensor's range."""
     _, scale, quadratic = profile.bias
     near, far = profile.range
+    if profile.noise is not None and abs(profile.noise[5]) > STEEPEST:
+        raise InputError(f"{source}: noise.power must be between -{STEEPEST:g} and {STEEPEST:g}")
     if not 0.0 <= near < far:
         raise InputError(f"{source}: range must be [nearest, farthest] in metres, got [{near}, {far}]")
     for depth in (max(near, 0.05), min(far, 50.0)):
@@ -179,10 +190,14 @@ def _number(value: Any, where: str, least: float = -math.inf) -> float:
     return float(value)
 
 
-def _camera(entry: Any, source: str) -> Camera:
-    if not isinstance(entry, dict):
+def _cameras(entries: Any, source: str) -> tuple[Camera, ...]:
+    if not isinstance(entries, list) or not all(isinstance(entry, dict) for entry in entries):
         raise InputError(f"{source}: 'intrinsics' must be a list of tables, written as [[intrinsics]]")
+    return tuple(_camera(entry, source) for entry in entries)
+
+
+def _camera(entry: dict[str, Any], source: str) -> Camera:
     try:
         return Camera(**entry)
-    except TypeError as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise InputError(f"{source}: [[intrinsics]] {error}; give width, height, fx, fy, cx, cy") from None
