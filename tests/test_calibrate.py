@@ -267,6 +267,12 @@ def test_a_calibration_file_comes_back_as_it_was(tmp_path: Path) -> None:
         assert Calibration.load(tmp_path / "silo.json").to_dict() == found.to_dict()
 
 
+def test_one_frame_by_the_papers_rule_comes_back_without_a_covariance(tmp_path: Path) -> None:
+    found = calibrate(sequence()[-1:], rule="mean-of-last-10")
+    found.save(tmp_path / "silo.json")
+    assert Calibration.load(tmp_path / "silo.json").to_dict() == found.to_dict()
+
+
 def _document() -> dict[str, Any]:
     document: dict[str, Any] = json.loads(json.dumps(calibrate(sequence()).to_dict()))
     return document
@@ -305,6 +311,17 @@ DAMAGES = {
     "evidence's hole": (["evidence", "frames", 1, "parameters", 0], None, "lacks a value"),
     "sums": (["evidence", "earlier"], [], "evidence.earlier"),
     "config": (["config"], None, "config"),
+    "endless number": (["r_x"], 10**400, "finite"),
+    "silo without width": (["silo", "radius"], 0.0, "above 0"),
+    "cone upside down": (["silo", "apex"], 0.1, "silo.apex"),
+    "negative deviation": (["silo", "std", "radius"], -0.1, "silo.std.radius"),
+    "no covariance": (["covariance"], None, "covariance"),
+    "diameter in words": (["config", "diameter"], "abc", "config.diameter"),
+    "diameter in millimetres": (["config", "diameter"], 3000.0, "config.diameter"),
+    "gravity in words": (["config", "gravity"], "down", "config.gravity"),
+    "sensor that is none": (["config", "sensor"], 5, "config.sensor"),
+    "bias in words": (["config", "sensor", "bias", "offset"], "x", "config.sensor.bias.offset"),
+    "noise without a floor": (["config", "sensor", "noise"], {}, "config.sensor.noise.floor"),
 }
 
 

@@ -197,7 +197,7 @@ class Calibration:
         }
 
     def _parameters(self) -> dict[str, Any] | None:
-        """All ten parameters with their covariance; what was not seen is null."""
+        """All parameters with their covariance; what was not seen is null."""
         if self.parameters is None or self.parameter_covariance is None:
             return None
         values = [float(v) if np.isfinite(v) else None for v in self.parameters]

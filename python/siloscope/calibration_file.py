@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope import sensors
 from siloscope.calibration import QUALITY, SCHEMA, STATUSES, Calibration, Evidence, FrameRecord
 from siloscope.errors import InputError
 from siloscope.estimate import SiloGeometry
@@ -22,6 +23,9 @@ from siloscope.surface import PARAMETERS, SurfaceEvidence
 
 LARGEST_FILE = 50_000_000
 """Bytes; 300 frames of evidence take about 1 MB."""
+
+LARGEST_NUMBER = 1e300
+"""No number of a calibration is larger; whole numbers of JSON may be of any length."""
 
 REMEDY = "take the file as `siloscope calibrate` wrote it, or calibrate again"
 
@@ -124,9 +128,9 @@ def _calibration(document: dict[str, Any]) -> Calibration:
         status,
         rule=_entry(document, "rule", str),
         pose=pose,
-        covariance=_covariance(_entry(document, "covariance", list), "covariance", 4) if ok else None,
-        silo=_geometry(silo, "silo"),
-        silo_std=_geometry(_entry(silo, "std", dict, "silo.std"), "silo.std"),
+        covariance=_covariance_or_none(document) if ok else None,
+        silo=_possible(_geometry(silo, "silo")),
+        silo_std=_geometry(_entry(silo, "std", dict, "silo.std"), "silo.std", least=0.0),
         parameters=values,
         parameter_covariance=covariance,
         excess=_number(document, "excess", least=1.0),
@@ -136,11 +140,40 @@ def _calibration(document: dict[str, Any]) -> Calibration:
         quality=tuple(_code(code) for code in _entry(document, "quality", list)),
         reason=_text_or_none(document, "reason"),
         message=_text_or_none(document, "message"),
-        config=_entry(document, "config", dict),
+        config=_config(document),
         timing_ms={str(k): _finite(v, f"timing_ms.{k}") for k, v in _entry(document, "timing_ms", dict).items()},
         evidence=_evidence(_entry(document, "evidence", dict)),
         method=_entry(document, "method", str),
     )
+
+
+def _covariance_or_none(document: dict[str, Any]) -> NDArray[np.float64] | None:
+    """The pose's covariance; one frame averaged by the paper's rule has none."""
+    if document.get("covariance") is None and document.get("rule") == "mean-of-last-10":
+        return None
+    return _covariance(_entry(document, "covariance", list), "covariance", 4)
+
+
+def _config(document: dict[str, Any]) -> dict[str, Any]:
+    """The settings; those that are gone on with are checked."""
+    config: dict[str, Any] = _entry(document, "config", dict)
+    if config.get("diameter") is not None and not 0.01 <= _number(config, "diameter", where="config") <= 200.0:
+        raise _Wrong("'config.diameter' must be between 0.01 and 200 m")
+    if config.get("gravity") is not None:
+        _vector(config, "gravity", "config.gravity", length=3)
+    if config.get("sensor") is not None:
+        _sensor(_entry(config, "sensor", dict, "config.sensor"))
+    return config
+
+
+def _sensor(table: dict[str, Any]) -> None:
+    _entry(table, "name", str, "config.sensor.name")
+    for part, names in (("bias", sensors.BIAS), ("bias_std", sensors.BIAS), ("noise", sensors.NOISE)):
+        if part == "noise" and table.get(part) is None:
+            continue
+        values = _entry(table, part, dict, f"config.sensor.{part}")
+        for name in names:
+            _number(values, name, where=f"config.sensor.{part}")
 
 
 def _parameters(document: dict[str, Any]) -> tuple[NDArray[np.float64] | None, NDArray[np.float64] | None]:
@@ -205,10 +238,19 @@ def _move(table: dict[str, Any], where: str) -> Move:
     return Move(_index(table, where), turn, shift, significance)
 
 
-def _geometry(table: dict[str, Any], where: str) -> SiloGeometry:
+def _geometry(table: dict[str, Any], where: str, least: float = -math.inf) -> SiloGeometry:
     names = ("radius", "cylinder_bottom", "apex")
-    values = {name: None if table.get(name) is None else _number(table, name, where=where) for name in names}
-    return SiloGeometry(**values)
+    known = (name for name in names if table.get(name) is not None)
+    return SiloGeometry(**{name: _number(table, name, least=least, where=where) for name in known})
+
+
+def _possible(silo: SiloGeometry) -> SiloGeometry:
+    """The geometry, if a silo can have it."""
+    if silo.radius is not None and silo.radius <= 0.0:
+        raise _Wrong(f"'silo.radius' must be above 0, not {silo.radius:g}")
+    if silo.cylinder_bottom is not None and silo.apex is not None and silo.apex < silo.cylinder_bottom:
+        raise _Wrong(f"'silo.apex' must lie below the cylinder's bottom, not at {silo.apex:g}")
+    return silo
 
 
 def _pose(table: dict[str, Any], where: str) -> SiloPose:
@@ -271,7 +313,7 @@ def _number(table: dict[str, Any], key: str, *, least: float = -math.inf, where:
 
 
 def _finite(value: Any, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) < LARGEST_NUMBER:
         raise _Wrong(f"'{where}' must be a finite number, not {str(value)[:40]!r}")
     return float(value)
 

@@ -35,7 +35,11 @@ def open_sink(out: Path, raw_unit: float | None = None) -> Sink:
     """The sink that the name of the output asks for: one of `SINKS`, else a folder; an archive is gone on with.
 
     `raw_unit` has floating-point depth written as 16-bit raw units of so many metres.
+
+    Raises `UsageError` for an output that is there already, or a unit that can't be one.
     """
+    if raw_unit is not None and not 1e-7 <= raw_unit <= 1.0:
+        raise UsageError(f"a raw unit of {raw_unit} m is not possible; give metres per raw unit, such as 0.001")
     if out.is_dir() and any(out.iterdir()) and not (out.suffix.lower() == ".zarr" and (out / "zarr.json").is_file()):
         raise UsageError(f"{out}: the folder is not empty; name a new one")
     if out.is_file():
