@@ -381,9 +381,13 @@ def test_the_command_tells_what_failed(folder: Path, tmp_path: Path, capsys: pyt
     broken.write_bytes((folder / "05.png").read_bytes()[:5000])
     assert run(folder / "05.png", folder / "04.png", broken, *terms, "-o", out) == 5
     assert Calibration.load(out).counts["unreadable"] == 1
+    assert "not read: " in (told := capsys.readouterr().err)
+    assert "broken.png" in told
     assert run(folder / "00.png", *terms, "-o", out) == 4
     assert Calibration.load(out).reason == "no-frame-answers"
     assert run(broken, *terms, "-o", out) == 3
-    assert run(folder / "05.png", *terms, "-o", tmp_path / "no" / "silo.json") == 2
+    assert run(folder / "no-such-frame.png", *terms, "-o", tmp_path / "no" / "silo.json") == 2
+    for place in (tmp_path, "."):
+        assert run(folder / "05.png", *terms, "-o", place) == 2
     assert run(folder / "05.png", *terms, "-o", out, "--rule", "median") == 2
     assert "Traceback" not in capsys.readouterr().err

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from siloscope import Calibration
 from siloscope.cli import main
 from siloscope.demo import METHODS, SCENE, scenes
 
@@ -79,3 +80,14 @@ def test_place_that_cannot_be_written_is_wrong_usage(tmp_path: Path, capsys: pyt
     (tmp_path / "file").write_text("")
     assert main(["demo", "--out", str(tmp_path / "file"), "--steps", "1"]) == 2
     assert str(tmp_path / "file") in capsys.readouterr().err
+
+
+def test_its_calibration_can_be_continued(done: tuple[Path, dict], tmp_path: Path) -> None:
+    frame, calibration = str(done[0] / "frame.png"), str(done[0] / "calibration.json")
+    assert main(["calibrate", frame, "--continue", calibration, "-o", str(tmp_path / "silo.json")]) == 0
+    assert Calibration.load(tmp_path / "silo.json").counts["used"] == 4
+
+
+def test_a_discharge_without_an_answer_has_a_page_too(tmp_path: Path) -> None:
+    assert main(["demo", "--out", str(tmp_path), "--steps", "1"]) == 0
+    assert "refused" in (tmp_path / "report.html").read_text("utf-8")

@@ -23,6 +23,7 @@ from siloscope.live import SensorProcess, sensor, turn_for_more_wall
 from siloscope.paper.scenarios import SILO3
 from siloscope.scene import Feed
 from siloscope.sensor_realsense import RealSense
+from siloscope.writers import write_camera, write_png
 
 DATA = Path(__file__).parent / "data"
 
@@ -268,3 +269,14 @@ def test_live_shows_a_panel_on_stderr_and_tells_of_damage(tmp_path: Path, capsys
     assert out == ""
     assert "refused" in err
     assert "not read" in err
+
+
+def test_live_replays_raw_images_with_their_unit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    seen = SILO3.render()
+    write_png(tmp_path / "frame.png", seen.raw(0.001))
+    write_camera(seen.camera, tmp_path / "camera.json")
+    frame = str(tmp_path / "frame.png")
+    assert main(["live", frame, "--json"]) == 3
+    assert "--depth-unit" in capsys.readouterr().err
+    assert main(["live", frame, "--json", "--depth-unit", "0.001"]) == 0
+    assert json.loads(capsys.readouterr().out)["status"] == "ok"

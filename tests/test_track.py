@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 import siloscope
 from silos import known, scene
 from siloscope.content import Content, Parts
-from siloscope.errors import InputError
+from siloscope.errors import InputError, UsageError
 from siloscope.scene import Feed
 from siloscope.track import _told
 from siloscope.tracking.events import legs
@@ -132,6 +132,22 @@ def test_a_level_without_a_cone_is_over_the_lowest_point_of_the_story() -> None:
 def test_no_frames_at_all() -> None:
     with pytest.raises(InputError, match="no frame"):
         siloscope.track([], known(scene(Feed("flat", 0.4))))
+
+
+@pytest.mark.parametrize(
+    "times", [{"interval": 0.0}, {"interval": float("nan")}, {"interval": 1e300}, {"start": START},
+              {"interval": 60.0, "start": float("inf")}],
+)  # fmt: skip
+def test_times_that_can_not_be_are_refused(times: dict[str, float]) -> None:
+    with pytest.raises(UsageError, match="interval"):
+        siloscope.track([], known(scene(Feed("flat", 0.4))), **times)
+
+
+def test_a_clock_that_was_set_in_between_tells_no_use() -> None:
+    falling = story([9.0 - 0.5 * i for i in range(8)], hours=24.0)
+    assert falling.use is not None
+    jumping = story([9.0 - 0.5 * i for i in range(8)], hours=1e15)
+    assert jumping.use is None
 
 
 def test_only_absolute_times_are_dates() -> None:

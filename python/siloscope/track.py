@@ -21,6 +21,9 @@ from siloscope.tracking.use import use
 TOGETHER = 120.0
 """Seconds between two frames that still tell whether the content moves while they are taken."""
 
+LONGEST_INTERVAL = 1e7
+"""Seconds between frames without a time of their own: some months."""
+
 Pathlike = str | PathLike[str]
 
 
@@ -42,9 +45,9 @@ def track(
     calibration : Calibration or path
         Pose and geometry.
     interval : float, optional
-        Seconds between frames that have no time of their own.
+        Seconds between frames that have no time of their own, at most `LONGEST_INTERVAL`.
     start : float, optional
-        Time of the first of them, seconds since 1970; 0 where not given.
+        Time of the first of them, seconds since 1970, with `interval`; 0 where not given.
     progress : callable, optional
         Is given the frames and gives them on, to show how far it has come.
     **settings
@@ -57,8 +60,10 @@ def track(
     UsageError
         For settings that can't be.
     """
-    if interval is not None and not (math.isfinite(interval) and interval > 0.0):
-        raise UsageError(f"interval must be a positive number of seconds, got {interval}")
+    if interval is not None and not 0.0 < interval <= LONGEST_INTERVAL:
+        raise UsageError(f"interval must be above 0 and at most {LONGEST_INTERVAL:g} s, got {interval}")
+    if start is not None and (interval is None or not math.isfinite(start)):
+        raise UsageError("start needs an interval: the frames after the first are that many seconds apart")
     silo = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
     source = readers.open(frames) if _is_path(frames) else frames  # type: ignore[arg-type]
     clock = _Clock(interval, start)

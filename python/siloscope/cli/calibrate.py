@@ -12,7 +12,7 @@ from rich.console import Console
 import siloscope
 from siloscope.calibration import QUALITY, Calibration
 from siloscope.cli import options
-from siloscope.cli.outcome import PARTIAL, REFUSED, print_json, writing
+from siloscope.cli.outcome import PARTIAL, REFUSED, check_place, print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.cli.summary import headline, pose_table, silo_line, tilt_line
 from siloscope.frames import FrameSource
@@ -43,6 +43,7 @@ def calibrate(
     Frames count by what they show; bad ones are left out and named. Where the camera has moved, only the frames since
     are fused. Exit code 4: no frame shows enough wall; 5: some frames can't be read, the rest is written.
     """
+    check_place(out)
     down = None if gravity is None else options.numbers(gravity, 3, "--gravity")
     with siloscope.frames.open(files, camera=camera, depth_unit=depth_unit, stream=stream) as source:
         found = siloscope.calibrate(
@@ -61,6 +62,7 @@ def calibrate(
         print_json(found.to_dict())
     else:
         _print(found, out)
+        _tell_left_out(found)
     if not found.ok:
         return REFUSED
     return PARTIAL if found.counts["unreadable"] else 0
@@ -87,6 +89,16 @@ def _print(found: Calibration, out: Path) -> None:
         console.print(line, markup=False)
     for code in found.quality:
         say(f"{code}: {QUALITY[code]}{_when(found) if code == 'camera-moved' else ''}")
+
+
+def _tell_left_out(found: Calibration) -> None:
+    """The frames that don't count though they should, on stderr."""
+    for record in found.frames:
+        if record.status == "unreadable":
+            say(f"not read: {record.reason or record.name}")
+        elif record.status == "rejected":
+            off = "" if record.deviation is None else f", {record.deviation:.0f} deviations off"
+            say(f"rejected: {record.name}{off}")
 
 
 def _when(found: Calibration) -> str:

@@ -29,9 +29,9 @@ def demo(
     with writing(out):
         out.mkdir(parents=True, exist_ok=True)
     done = list(track(locate_all(scenes(steps)), "locating", total=steps))
-    say("drawing the report")
     calibration = fused(done)
     contents = list(track(measured(done, calibration), "measuring", total=steps))
+    say("drawing the report")
     report = _write(done, calibration, contents, out)
     found = sum(step.estimates["surface"].ok for step in done)
     if as_json:

@@ -36,6 +36,7 @@ def live(
     ],
     camera: options.CameraFile = None,
     sensor_profile: options.Sensor = None,
+    depth_unit: options.DepthUnit = None,
     diameter: options.Diameter = None,
     gravity: options.Gravity = None,
     stream: options.Stream = None,
@@ -55,7 +56,11 @@ def live(
     settings["gravity"] = None if gravity is None else options.numbers(gravity, 3, "--gravity")
     given = {name: value for name, value in settings.items() if value is not None}
     shown, problems = 0, list[str]()
-    with contextlib.suppress(KeyboardInterrupt), _frames(source, camera, stream) as frames, _screen(as_json) as show:
+    with (
+        contextlib.suppress(KeyboardInterrupt),
+        _frames(source, camera, depth_unit, stream) as frames,
+        _screen(as_json) as show,
+    ):
         for frame in islice(frames, count):
             started = time.perf_counter()
             estimate = siloscope.locate(frame, **given)
@@ -70,10 +75,12 @@ def live(
 
 
 @contextmanager
-def _frames(source: str, camera: Path | None, stream: str | None) -> Iterator[Iterable[Frame]]:
-    """Frames of a live camera, or of a recording."""
+def _frames(
+    source: str, camera: Path | None, depth_unit: float | None, stream: str | None
+) -> Iterator[Iterable[Frame]]:
+    """Frames of a live camera, which tells its unit itself, or of a recording."""
     if source not in ("realsense", "orbbec"):
-        with siloscope.frames.open(source, camera=camera, stream=stream) as recording:
+        with siloscope.frames.open(source, camera=camera, depth_unit=depth_unit, stream=stream) as recording:
             yield recording
         return
     with SensorProcess(sensor(source)) as process:

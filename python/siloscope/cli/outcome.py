@@ -10,6 +10,7 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -58,6 +59,16 @@ def guarded(run: Callable[[], Any], arguments: Sequence[str]) -> int:
 def print_json(document: Any) -> None:
     """Print the one JSON document of a command; NaN and infinities become null."""
     print(json.dumps(finite(document), indent=2, allow_nan=False))
+
+
+def check_place(file: Path) -> None:
+    """Refuses a place where no file can be written, before hours of work end there."""
+    folder = file.parent
+    cause = "it is a folder" if file.is_dir() else None if folder.is_dir() else f"there is no folder {folder}"
+    if cause is None and not os.access(folder, os.W_OK):
+        cause = f"{folder} is not writable"
+    if cause is not None:
+        raise UsageError(f"{file}: cannot be written ({cause}); name another place")
 
 
 @contextlib.contextmanager

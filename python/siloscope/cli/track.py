@@ -126,7 +126,7 @@ def _print(found: Track) -> None:
 
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else WIDTH)
     table = Table(box=None, padding=(0, 2, 0, 0))
-    table.add_column("time", style="bold", no_wrap=True)
+    table.add_column("time", style="bold", overflow="fold")
     weighed = any(reading.mass is not None for reading in found.readings)
     for name in ("volume (m³)", "level (m)", "mass (kg)", f"flow ({'t' if weighed else 'm³'}/h)"):
         table.add_column(name, justify="right", no_wrap=True)
@@ -156,6 +156,7 @@ def _row(reading: Reading, weighed: bool) -> tuple[str, ...]:
 
     volume = "" if reading.volume is None else with_std(reading.volume, reading.volume_std, 1.0, "")
     remark = ", ".join(reading.quality) if reading.status == "ok" else f"{reading.status}: {reading.reason}"
-    time = reading.name if reading.time is None else when(reading.time)
+    name = "" if reading.name == reading.reason else reading.name  # of a file that can't be opened there is no more
+    time = name if reading.time is None else when(reading.time)
     flow = reading.mass_flow if weighed else reading.flow
     return (time, volume, number(reading.level, 3), number(reading.mass, 0), number(flow, 3), remark)

@@ -148,7 +148,7 @@ def _camera(data: Frame | ArrayLike, camera: Camera | None, calibration: Calibra
     table = calibration.config.get("camera")
     try:
         return None if table is None else Camera(**{**table, "distortion": tuple(table["distortion"])})
-    except (TypeError, KeyError):
+    except (TypeError, KeyError, ValueError):
         raise InputError("the calibration's camera is damaged; give --camera FILE") from None
 
 

@@ -34,7 +34,8 @@ def page(steps: Sequence[Step], calibration: Calibration, contents: Sequence[Con
     )
     report.cards(_cards(steps))
     shown = pictures(last.seen.frame(), last.estimates["surface"])
-    report.section("What was found in the last frame", *_found(last), _png(shown["clouds"], _CLOUDS))
+    clouds = [_png(shown["clouds"], _CLOUDS)] if "clouds" in shown else []
+    report.section("What was found in the last frame", *_found(last), *clouds)
     report.section("Over the discharge", *_discharge(steps))
     report.section("All frames together", *_calibration(steps, calibration))
     report.section("What is in it", *content.section(steps, contents))

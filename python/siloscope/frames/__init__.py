@@ -138,6 +138,8 @@ def _head(path: Path) -> bytes:
             raise InputError(f"{path}: not a file or folder; save the frame in a file first")
         with path.open("rb") as file:
             head = file.read(HEAD_BYTES)
+    except InputError:
+        raise
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; check the path") from None
     except (OSError, ValueError) as error:

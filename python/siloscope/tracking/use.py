@@ -12,6 +12,9 @@ from siloscope.tracking.story import DAY, Event, Moment, Use
 FEWEST_DAYS = 1.0
 """Shorter histories tell no daily use."""
 
+MOST_DAYS = 36_500.0
+"""Longer histories have clocks that were set in between."""
+
 FARTHEST = 3650.0
 """Days beyond which nobody forecasts."""
 
@@ -25,7 +28,7 @@ def use(moments: list[Moment], events: tuple[Event, ...]) -> Use | None:
     volume = np.array([float(m.content.volume or 0.0) for m in timed])
     span = (times[-1] - times[0]) / DAY
     used = _used(times, volume, events)
-    if span < FEWEST_DAYS or used[-1] <= 0.0 or (np.diff(times) < 0.0).any():
+    if not FEWEST_DAYS <= span <= MOST_DAYS or used[-1] <= 0.0 or (np.diff(times) < 0.0).any():
         return None
     daily = float(used[-1]) / span
     spread = _day_to_day(times, used, daily)
