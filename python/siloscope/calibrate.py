@@ -6,7 +6,7 @@ import math
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
@@ -53,6 +53,9 @@ REASONS = {
     ),
 }
 """Why there is no calibration: what it means, and what to try."""
+
+SEARCHED = 16
+"""Of so many frames one is searched for the wall; the others look for it first where such a frame has shown it."""
 
 Pathlike = str | PathLike[str]
 
@@ -202,36 +205,74 @@ def _camera(before: Calibration | None, answers: list[_Answer]) -> dict[str, Any
     return known[0] if known else None
 
 
-def _locator(camera: Camera | None, depth_unit: float | None, settings: _Settings) -> Callable[[int, Any], _Answer]:
-    def one(number: int, frame: Any) -> _Answer:
+Locate = Callable[[int, Any, Estimate | None], tuple[_Answer, Estimate | None]]
+"""Number, frame and where to start, to the answer, and where others may start."""
+
+
+def _locator(camera: Camera | None, depth_unit: float | None, settings: _Settings) -> Locate:
+    def one(number: int, frame: Any, start: Estimate | None) -> tuple[_Answer, Estimate | None]:
         if isinstance(frame, Estimate):
-            return _Answer(f"estimate {number}", None, frame)
+            return _Answer(f"estimate {number}", None, frame), None
         name = frame.source if isinstance(frame, Frame) else f"frame {number}"
         timestamp = frame.timestamp if isinstance(frame, Frame) else None
         known: dict[str, Any] = {"diameter": settings.diameter, "gravity": settings.gravity, "depth_unit": depth_unit}
         try:
-            estimate = locate(frame, camera, sensor=settings.profile, **known)
+            estimate = locate(frame, camera, sensor=settings.profile, start=start, ratios=False, **known)
         except InputError as error:
-            return _Answer(name, timestamp, None, error)
+            return _Answer(name, timestamp, None, error), None
         mine = camera or (frame.camera if isinstance(frame, Frame) else None)
-        return _Answer(name, timestamp, replace(estimate, details=None), camera=mine)
+        return _Answer(name, timestamp, replace(estimate, details=None), camera=mine), estimate
 
     return one
 
 
-def _answers(frames: Iterable[Any], one: Callable[[int, Any], _Answer], jobs: int) -> Iterator[_Answer]:
-    """The frames located in order; with several jobs the next ones are read while others are being located."""
-    if jobs == 1:
-        yield from (one(number, frame) for number, frame in enumerate(frames))
-        return
-    waiting: deque[Future[_Answer]] = deque()
-    with ThreadPoolExecutor(jobs) as pool:
+def _answers(frames: Iterable[Any], one: Locate, jobs: int) -> Iterator[_Answer]:
+    """The frames located in order; with several jobs the next ones are read while others are being located.
+
+    Which frame starts from which answer is settled by their order alone, so that the jobs don't change any answer.
+    """
+    waiting: deque[Future[tuple[_Answer, Estimate | None]]] = deque()
+    starts = _Starts()
+    with _Inline() if jobs == 1 else ThreadPoolExecutor(jobs) as pool:
         for number, frame in enumerate(frames):
-            waiting.append(pool.submit(one, number, frame))
-            if len(waiting) > 2 * jobs:
-                yield waiting.popleft().result()
+            waiting.append(pool.submit(one, number, frame, starts.of(number)))
+            starts.add(number, waiting[-1])
+            if len(waiting) > 2 * jobs or jobs == 1:
+                yield waiting.popleft().result()[0]
         while waiting:
-            yield waiting.popleft().result()
+            yield waiting.popleft().result()[0]
+
+
+class _Starts:
+    """Where frames start: a searched one from nothing, the others from the last but one that was searched.
+
+    The last one may still be at work; only the first frames wait for it.
+    """
+
+    def __init__(self) -> None:
+        self.searched: deque[Future[tuple[_Answer, Estimate | None]]] = deque()
+        self.start: Estimate | None = None
+
+    def of(self, number: int) -> Estimate | None:
+        if number % SEARCHED == 0:
+            return None
+        while len(self.searched) > (1 if number > SEARCHED else 0):
+            found = self.searched.popleft().result()[1]
+            self.start = found if found is not None and found.ok else self.start
+        return self.start
+
+    def add(self, number: int, answer: Future[tuple[_Answer, Estimate | None]]) -> None:
+        if number % SEARCHED == 0:
+            self.searched.append(answer)
+
+
+class _Inline(Executor):
+    """Does the work at once, in this thread."""
+
+    def submit(self, work: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+        done: Future[Any] = Future()
+        done.set_result(work(*given, **named))
+        return done
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,8 @@ class Settings:
     grid: Number
     neighbours: int
     threads: int
+    start: Estimate | None
+    ratios: bool
 
 
 def locate(
@@ -47,6 +49,8 @@ def locate(
     grid: Number = None,
     neighbours: int = 30,
     threads: int = 1,
+    start: Estimate | None = None,
+    ratios: bool = True,
 ) -> Estimate:
     """Find the silo's axis in one frame, and with it the camera's pose (Eqs. 5–7).
 
@@ -77,6 +81,11 @@ def locate(
         Neighbours for normals and shape tensors (method ``shape-tensor``).
     threads : int
         Threads for what can be shared; the answer does not depend on it.
+    start : Estimate, optional
+        An answer for another frame of the same camera in the same silo (method ``surface``, depth images). The wall is
+        looked for there first, which is quicker; a frame that does not plainly confirm it is searched as without.
+    ratios : bool
+        Whether to work out how much of the frame is cylinder, cone and feed (method ``surface``).
 
     Returns
     -------
@@ -101,6 +110,8 @@ def locate(
         _bounded("grid", grid, 1e-4, 10.0),
         int(_whole("neighbours", neighbours, 6, 500)),
         int(_whole("threads", threads, 1, 256)),
+        start,
+        ratios,
     )
     prepared = prepare(data, camera, profile, depth_unit=depth_unit, mask=mask, crop=crop)
     if settings.gravity is None and prepared.gravity is not None:
@@ -114,6 +125,7 @@ def _surface(prepared: Prepared, settings: Settings, config: dict[str, Any]) -> 
         return surface.fit_points(prepared.points, grid=settings.grid, threads=settings.threads, **known)
     assert prepared.depth is not None
     assert prepared.camera is not None
+    known |= {"start": settings.start, "ratios": settings.ratios}
     return surface.fit_depth(prepared.depth, prepared.camera, settings.profile, **known)
 
 

@@ -70,6 +70,8 @@ class SurfaceDetails:
 
     points: NDArray[np.float64]
     residuals: NDArray[np.float64]
+    wall: Any = None
+    """Where the frame shows the wall, for the next frames' fit to start from."""
     _labelled: Callable[[], NDArray[np.uint8]] | None = None
 
     @cached_property
@@ -87,6 +89,8 @@ def fit_depth(
     diameter_std: float = DIAMETER_STD,
     gravity: NDArray[np.float64] | None = None,
     gravity_std: float = GRAVITY_STD,
+    start: Estimate | None = None,
+    ratios: bool = True,
     config: dict[str, Any] | None = None,
 ) -> Estimate:
     """Fit the wall to a depth image.
@@ -104,17 +108,22 @@ def fit_depth(
     gravity : float (3,), optional
         Direction of gravity in the camera frame, any length; used as a prior on the axis and reported against the
         answer without it.
+    start : Estimate, optional
+        Of another frame of the same camera: the wall is looked for there before it is searched.
+    ratios : bool
+        Whether to work out how much of the frame is cylinder, cone and feed.
     config : dict, optional
         Effective settings to record in the estimate.
     """
     radius, pull = _priors(diameter, diameter_std, gravity, gravity_std)
+    wall = None if start is None or start.details is None else start.details.wall
     frame = (depth, camera.rays(), profile.bias, profile.bias_std, profile.noise, radius, pull)
-    found = _core.surface_fit_image(*frame)
+    found = _core.surface_fit_image(*frame, wall=wall, ratios=ratios)
     if "refusal" in found:
         return refused("surface", found["refusal"], config or {})
 
     def labelled() -> NDArray[np.uint8]:
-        labels: NDArray[np.uint8] = _core.surface_fit_image(*frame, labels=True)["labels"]
+        labels: NDArray[np.uint8] = _core.surface_fit_image(*frame, labels=True, wall=wall)["labels"]
         return labels
 
     return _estimate(found, profile, config or {}, diameter, gravity, labelled)
@@ -215,7 +224,7 @@ def _estimate(
         timing_ms={name.replace(" ", "_"): ms for name, ms in found["timing"]},
         extra=extra,
         evidence=_evidence(found, profile, diameter, gravity),
-        details=SurfaceDetails(found["points"], found["residuals"], labelled),
+        details=SurfaceDetails(found["points"], found["residuals"], found["wall"], labelled),
     )
 
 

@@ -4,19 +4,38 @@ use crate::convert::value_error;
 use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use siloscope::Vec3;
 use siloscope::fit::{Knowledge, Outcome, SurfaceFit, fit_cloud, fit_image};
+use siloscope::known_wall::KnownWall;
 use siloscope::labels::{coverage, label_pixels};
 use siloscope::patches::DepthImage;
 use siloscope::refusal::Refusal;
 use siloscope::sensor::{DepthBias, DepthError, NoiseLaw};
 use siloscope::share::FrameShare;
-use siloscope::surface::PARAMETERS;
+use siloscope::surface::{Cone, PARAMETERS, SiloSurface};
 use siloscope::workers::Workers;
+use siloscope::{SiloPose, Vec3};
 
 /// Bias and noise as plain numbers: offset, scale, quadratic; floor, constant, linear, quadratic, factor, power.
 type Bias = (f64, f64, f64);
 type Noise = (f64, f64, f64, f64, f64, f64);
+
+/// A wall found before: pose, radius, slope and apex of the cone, depth bias, whether it is seen from inside, misfit,
+/// whether it is oval.
+type Wall = ((f64, f64, f64, f64), Option<f64>, Option<(f64, f64)>, Bias, bool, f64, bool);
+
+fn known_wall((pose, radius, cone, bias, inside, misfit, oval): Wall) -> KnownWall {
+    let pose = SiloPose { r_x: pose.0, r_y: pose.1, t_x: pose.2, t_y: pose.3 };
+    let cone = cone.map(|(slope, apex)| Cone { slope, apex });
+    let bias = DepthBias { offset: bias.0, scale: bias.1, quadratic: bias.2 };
+    KnownWall { surface: SiloSurface { pose, radius, cone, ovality: [0.0; 2] }, bias, inside, misfit, oval }
+}
+
+fn plain(wall: &KnownWall) -> Wall {
+    let KnownWall { surface: SiloSurface { pose, radius, cone, .. }, bias, .. } = *wall;
+    let pose = (pose.r_x, pose.r_y, pose.t_x, pose.t_y);
+    let bias = (bias.offset, bias.scale, bias.quadratic);
+    (pose, radius, cone.map(|c| (c.slope, c.apex)), bias, wall.inside, wall.misfit, wall.oval)
+}
 
 fn depth_error(bias: Bias, bias_std: Bias, noise: Option<Noise>) -> DepthError {
     DepthError {
@@ -36,9 +55,10 @@ fn depth_error(bias: Bias, bias_std: Bias, noise: Option<Noise>) -> DepthError {
 /// Fits the wall to a depth image: float32 depth (H, W) in metres and float64 rays (H, W, 2).
 ///
 /// Returns a dictionary of plain numbers and arrays; where there is no answer it holds only the reason, as `refusal`.
-/// With `labels` it also holds each pixel's label.
+/// With `labels` it also holds each pixel's label, with `ratios` what each label covers. A `wall` found before is tried
+/// first.
 #[pyfunction]
-#[pyo3(signature = (depth, rays, bias, bias_std, noise=None, radius=None, gravity=None, labels=false))]
+#[pyo3(signature = (depth, rays, bias, bias_std, noise=None, radius=None, gravity=None, labels=false, wall=None, ratios=true))]
 #[allow(clippy::too_many_arguments)]
 fn surface_fit_image<'py>(
     py: Python<'py>,
@@ -50,6 +70,8 @@ fn surface_fit_image<'py>(
     radius: Option<(f64, f64)>,
     gravity: Option<(f64, f64, f64, f64)>,
     labels: bool,
+    wall: Option<Wall>,
+    ratios: bool,
 ) -> PyResult<Bound<'py, PyDict>> {
     let (height, width) = (depth.shape()[0], depth.shape()[1]);
     if rays.shape() != [height, width, 2] {
@@ -63,12 +85,18 @@ fn surface_fit_image<'py>(
         gravity: gravity.map(|(x, y, z, std)| (Vec3::new(x, y, z), std)),
     };
     let image = DepthImage { width, height, rays, depth };
+    let wall = wall.map(known_wall);
     let found = py.detach(|| {
-        let found = fit_image(&image, &know);
+        let found = fit_image(&image, &know, wall.as_ref());
         let labels = found.as_ref().ok().filter(|_| labels).map(|fit| label_pixels(&image, fit));
-        (found, labels)
+        let seen = found.as_ref().ok().filter(|_| ratios).map(coverage);
+        (found, labels, seen)
     });
     let out = outcome(py, found.0)?;
+    if let Some(seen) = found.2 {
+        out.set_item("pixel_counts", seen.counts)?;
+        out.set_item("areas", seen.areas)?;
+    }
     if let Some(labels) = found.1 {
         out.set_item("labels", PyArray1::from_vec(py, labels).reshape([height, width])?)?;
     }
@@ -130,15 +158,11 @@ fn result<'py>(py: Python<'py>, found: &SurfaceFit) -> PyResult<Bound<'py, PyDic
     out.set_item("pose", (pose.r_x, pose.r_y, pose.t_x, pose.t_y))?;
     out.set_item("radius", found.fit.surface.radius)?;
     out.set_item("cone", found.fit.surface.cone.map(|c| (c.slope, c.apex)))?;
-    if !found.patches.cloud {
-        let seen = coverage(found);
-        out.set_item("pixel_counts", seen.counts)?;
-        out.set_item("areas", seen.areas)?;
-    }
     out.set_item("ovality", found.fit.surface.ovality)?;
     let bias = found.fit.bias;
     out.set_item("bias", (bias.offset, bias.scale, bias.quadratic))?;
     out.set_item("inside", found.fit.inside)?;
+    out.set_item("wall", (!found.patches.cloud).then(|| plain(&found.wall)))?;
     out.set_item("misfit", found.fit.misfit)?;
     out.set_item("chi_square", found.chi_square)?;
     out.set_item("free", found.free.to_vec())?;

@@ -28,7 +28,7 @@ pub struct Settled {
 /// The depth scale stays fixed here: it trades against the silo's size along a curve on which Gauss–Newton steps crawl.
 /// A known radius then moves the answer along that curve exactly.
 pub fn coarse_fit(patches: &mut Patches, noise: NoiseLaw, prior: &Prior, pixel: f64) -> Result<Settled, Refusal> {
-    let free_size = Prior { radius: prior.radius.filter(|_| prior.bias_std[1] == 0.0), ..prior.clone() };
+    let free_size = with_free_size(prior);
     if patches.cloud {
         let found = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Unknown);
         return best_settled(patches, noise, (&free_size, pixel), found);
@@ -38,6 +38,11 @@ pub fn coarse_fit(patches: &mut Patches, noise: NoiseLaw, prior: &Prior, pixel: 
         let from_outside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Outside);
         best_settled(patches, noise, (&free_size, pixel), from_outside).map_err(|_| refusal)
     })
+}
+
+/// The prior without a known radius, where the depth scale is not known either.
+pub(crate) fn with_free_size(prior: &Prior) -> Prior {
+    Prior { radius: prior.radius.filter(|_| prior.bias_std[1] == 0.0), ..prior.clone() }
 }
 
 /// The likeliest candidate that stands up to the evidence, or why the likeliest does not.
@@ -109,7 +114,7 @@ fn is_near(start: &Start, fit: &Fit) -> bool {
 }
 
 /// Refines a candidate on more patches and holds it against the evidence.
-fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusal> {
+pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusal> {
     if fit.surface.cone.is_none() != fit.surface.radius.is_none() && fit.inside {
         fit = with_other_part(problem, fit);
     }

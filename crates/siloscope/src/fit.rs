@@ -5,6 +5,7 @@ use crate::Vec3;
 use crate::cloud::cloud_patches;
 use crate::coarse::{Settled, coarse_fit, drop_bare_parts};
 use crate::covariance::{relief, relief_uncertainty, scale_uncertainty, shows_ovality, widened};
+use crate::known_wall::{KnownWall, confirmed};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
 use crate::refine::{Fit, Prior, Problem, free_parameters, tukey};
@@ -43,6 +44,8 @@ pub struct SurfaceFit {
     pub chi_square: f64,
     /// What the wall looks like.
     pub evidence: WallEvidence,
+    /// The wall as patches show it, for other frames of the same camera.
+    pub wall: KnownWall,
     /// The patches.
     pub patches: Patches,
     /// Final residual of each wall patch across the wall, metres; NaN elsewhere.
@@ -67,8 +70,8 @@ fn form(fit: &Fit, oval: bool) -> f64 {
     MISFIT_FORM * (fit.misfit - CHANCE_MISFIT).max(0.0) + if oval { WALL_FORM } else { 0.0 }
 }
 
-/// Fits the wall to a depth image.
-pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
+/// Fits the wall to a depth image; where another frame of the camera has shown a wall, it is looked for there first.
+pub fn fit_image(image: &DepthImage, know: &Knowledge, known: Option<&KnownWall>) -> Outcome {
     let mut clock = Clock::start();
     let mut patches = tile_patches(image, know.error.noise.as_ref());
     if patches.list.len() < 30 {
@@ -76,28 +79,67 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge) -> Outcome {
     }
     patches.unbias_normals(&know.error.bias);
     clock.lap("patches");
-    let (noise, mut prior, pixel) = (noise(&patches, know), prior(know), pixel_size(image));
-    let Settled { mut fit, wall, evidence } = coarse_fit(&mut patches, noise, &prior, pixel)?;
-    clock.lap("coarse fit");
-    if let (Some((radius, _)), true) = (know.radius, prior.bias_std[1] > 0.0) {
-        fit.rescale_to(radius);
-    }
-    let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-    drop_bare_parts(&problem, &mut fit, &wall);
-    let (noise, mut equations) = on_pixels(problem, image, &mut fit, &wall, know.error.noise);
-    let round = Problem { patches: &patches, noise, prior: &prior, pixel };
-    if shows_ovality(&round, &fit, &mut equations, OVALITY_STD) {
-        prior.ovality_std = OVALITY_STD;
-        let oval = Problem { patches: &patches, noise, prior: &prior, pixel };
-        (_, equations) = on_pixels(oval, image, &mut fit, &wall, Some(noise));
-    }
-    let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-    clock.lap("pixels");
-    let mut result = finish(&problem, fit, &mut equations, evidence, know.error.noise.is_some())?;
-    clock.lap("covariance");
+    let (noise, prior, pixel) = (noise(&patches, know), prior(know), pixel_size(image));
+    let confirmed = known.and_then(|wall| {
+        let found = confirmed(&mut patches, noise, &prior, pixel, wall);
+        clock.lap("known wall");
+        let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
+        measured(problem, image, know, found?, Looks::None, &mut clock).ok().filter(|fit| fit.confirms(wall))
+    });
+    let mut result = match confirmed {
+        Some(fit) => fit,
+        None => {
+            patches.unbias_normals(&know.error.bias);
+            let found = coarse_fit(&mut patches, noise, &prior, pixel)?;
+            clock.lap("coarse fit");
+            let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
+            measured(problem, image, know, found, Looks::Usual, &mut clock)?
+        }
+    };
     result.timing = clock.laps;
     result.patches = patches;
     Ok(result)
+}
+
+/// The wall that patches have settled on, measured by its pixels.
+fn measured(
+    problem: Problem,
+    image: &DepthImage,
+    know: &Knowledge,
+    found: Settled,
+    looks: Looks,
+    clock: &mut Clock,
+) -> Outcome {
+    let mut known = KnownWall::of(&found);
+    let Settled { mut fit, wall, evidence } = found;
+    let mut prior = problem.prior.clone();
+    if let (Some((radius, _)), true) = (know.radius, prior.bias_std[1] > 0.0) {
+        fit.rescale_to(radius);
+    }
+    drop_bare_parts(&problem, &mut fit, &wall);
+    known.drop_parts_without(&fit.surface);
+    let (noise, mut equations) = on_pixels(problem, image, &mut fit, &wall, know.error.noise, looks);
+    let round = Problem { noise, ..problem };
+    known.oval = shows_ovality(&round, &fit, &mut equations, OVALITY_STD);
+    if known.oval {
+        prior.ovality_std = OVALITY_STD;
+        let oval = Problem { prior: &prior, ..round };
+        (_, equations) = on_pixels(oval, image, &mut fit, &wall, Some(noise), Looks::Usual);
+    }
+    let problem = Problem { prior: &prior, ..round };
+    clock.lap("pixels");
+    let result = finish(&problem, fit, &mut equations, (evidence, known), know.error.noise.is_some());
+    clock.lap("covariance");
+    result
+}
+
+/// How often the pixels are looked at before they are all asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Looks {
+    /// As often as it takes from a wall found on patches.
+    Usual,
+    /// Not where the noise is known: the wall lies so near the answer that its equations are as good as linear.
+    None,
 }
 
 /// Steps on some of the pixels, then the equations of all; and the noise law, from the residuals where none is known.
@@ -107,8 +149,13 @@ fn on_pixels(
     fit: &mut Fit,
     wall: &[bool],
     known: Option<NoiseLaw>,
+    looks: Looks,
 ) -> (NoiseLaw, Vec<TileEquation>) {
-    let reaches: &[f64] = if known.is_some() { &[3.0] } else { &[3.0, 2.0] }; // a noise law asks for a second look
+    let reaches: &[f64] = match (known, looks) {
+        (Some(_), Looks::None) => &[],
+        (Some(_), Looks::Usual) => &[3.0],
+        (None, _) => &[3.0, 2.0], // a noise law asks for a second look
+    };
     for &reach in reaches {
         problem.noise = polish(&problem, image, fit, wall, reach, known);
     }
@@ -129,6 +176,11 @@ impl SurfaceFit {
             placed.to_silo(&p.at(d))
         };
         self.patches.list.iter().map(to_silo).collect()
+    }
+
+    /// Whether it shows a known wall again: the same parts in the same place, and oval if that was.
+    fn confirms(&self, wall: &KnownWall) -> bool {
+        self.wall.oval == wall.oval && wall.is_same(&self.wall.surface)
     }
 
     /// Whether most of the wall's normals, turned towards the origin, point to the axis.
@@ -158,15 +210,17 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
     let exact = DepthError { bias: DepthBias::default(), bias_std: [0.0; 3], noise: None };
     let prior = prior(&Knowledge { error: exact, ..know.clone() });
     let noise = NoiseLaw::uniform(1e-3); // not used: patches of a cloud carry their own scatter
-    let Settled { mut fit, wall, evidence } = match coarse_fit(&mut patches, noise, &prior, 0.0) {
+    let found = match coarse_fit(&mut patches, noise, &prior, 0.0) {
         Ok(found) => found,
         Err(refusal) => return Ok(Err(refusal)),
     };
+    let known = KnownWall::of(&found);
+    let Settled { mut fit, wall, evidence } = found;
     clock.lap("coarse fit");
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
     drop_bare_parts(&problem, &mut fit, &wall);
     let mut equations = patch_equations(&problem, &fit, &wall);
-    let mut result = match finish(&problem, fit, &mut equations, evidence, false) {
+    let mut result = match finish(&problem, fit, &mut equations, (evidence, known), false) {
         Ok(found) => found,
         Err(refusal) => return Ok(Err(refusal)),
     };
@@ -216,7 +270,7 @@ fn finish(
     problem: &Problem,
     mut fit: Fit,
     tiles: &mut [TileEquation],
-    evidence: WallEvidence,
+    (evidence, wall): (WallEvidence, KnownWall),
     noise_is_known: bool,
 ) -> Outcome {
     let system = solve_equations(problem, &mut fit, tiles, 4).ok_or(Refusal::PoorlyDetermined)?;
@@ -243,6 +297,7 @@ fn finish(
         noise: problem.noise,
         chi_square,
         evidence,
+        wall,
         patches: Patches::default(),
         residuals,
         fit,

@@ -20,6 +20,7 @@ pub mod error;
 pub mod evidence;
 pub mod fit;
 pub mod grid;
+pub mod known_wall;
 pub mod labels;
 pub mod locate;
 pub mod nearest;
