@@ -11,6 +11,7 @@ from siloscope import Estimate, SiloPose, sensors
 from siloscope.paper import metrics
 from siloscope.paper.scenarios import random_scene, scenario
 from siloscope.scene import ASTRA_S, Feed, Scene, defects
+from siloscope.sensors import SensorProfile
 from siloscope.surface import fit_depth, reasons
 
 NAMES = ("silo1", "silo2", "silo3")
@@ -37,6 +38,22 @@ def test_exact_frames_give_the_exact_pose_and_silo(name: str) -> None:
     truth = scene.silo.geometry
     assert estimate.silo.apex == pytest.approx(truth.apex, abs=1e-5)
     assert estimate.silo.radius == pytest.approx(truth.radius, abs=1e-5)
+
+
+LENSES = {
+    "brown_conrady": (-0.28, 0.08, 0.001, -0.001, 0.0),
+    "kannala_brandt": (0.05, -0.02, 0.01, 0.0),
+}
+
+
+@pytest.mark.parametrize("model", LENSES)
+@pytest.mark.parametrize("name", ["silo2", "silo3"])
+def test_a_distorted_lens_costs_no_accuracy(name: str, model: str) -> None:
+    scene = scenario(name)
+    bent = replace(scene, camera=replace(scene.camera, distortion_model=model, distortion=LENSES[model]))
+    depth = np.nan_to_num(bent.render().depth).astype(np.float32)
+    found = fit_depth(depth, bent.camera, SensorProfile("exact", noise=(5e-4, 0, 0, 0, 0, 1)))
+    assert gap(found, bent) < 1e-3  # with straight lines between a tile's corners: up to 1e-2
 
 
 @pytest.mark.parametrize("name", NAMES)
