@@ -10,6 +10,7 @@ import pytest
 from siloscope import Estimate, SiloPose, sensors
 from siloscope.paper import metrics
 from siloscope.paper.scenarios import random_scene, scenario
+from siloscope.paper.stand_ins import IRREGULAR, real_silo
 from siloscope.scene import ASTRA_S, Feed, Scene, defects
 from siloscope.sensors import SensorProfile
 from siloscope.surface import fit_depth, reasons
@@ -107,6 +108,18 @@ def test_a_narrow_view_of_an_oval_silo_is_covered_by_the_stated_deviation() -> N
     assert found.covariance is not None
     error = np.array([getattr(found.pose, k) - getattr(scene.pose, k) for k in ("r_x", "r_y", "t_x", "t_y")])
     assert np.all(np.abs(error) < 3.0 * np.sqrt(found.covariance.diagonal()))
+
+
+@pytest.mark.parametrize("level", [0.05, 0.2, 0.35])
+def test_a_farms_silo_is_found_with_nothing_known_of_its_sensor(level: float) -> None:
+    silo = real_silo("silo-r2", 12)
+    scene = replace(silo, feed=replace(IRREGULAR, level=level))
+    found = fit(scene, None)
+    assert found.pose is not None, found.message
+    assert found.covariance is not None
+    error = np.array([getattr(found.pose, k) - getattr(scene.pose, k) for k in ("r_x", "r_y", "t_x", "t_y")])
+    assert np.all(np.abs(error) < 2.5 * np.sqrt(found.covariance.diagonal()))
+    assert gap(found, scene) < 30.0
 
 
 def test_an_auger_in_view_is_no_silo_seen_from_outside() -> None:
