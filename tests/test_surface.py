@@ -127,6 +127,14 @@ def test_an_auger_in_view_is_no_silo_seen_from_outside() -> None:
     assert fit(scene, "orbbec-astra-s").status == "refused"
 
 
+@pytest.mark.parametrize("seed", [302, 308, 313, 335])
+def test_a_funnel_of_feed_below_an_auger_is_not_taken_for_the_cone(seed: int) -> None:
+    scene = in_use(seed, "funnel", 0.3 + 0.01 * (seed % 30), "auger")
+    found = fit(scene, "orbbec-astra-s")
+    assert found.pose is not None, found.message
+    assert found.silo.apex is None or found.silo.apex == pytest.approx(scene.silo.geometry.apex, abs=0.05)
+
+
 def test_every_reason_has_a_meaning_and_advice() -> None:
     for slug, (meaning, advice) in reasons().items():
         assert slug == slug.lower()
