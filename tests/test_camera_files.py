@@ -231,3 +231,23 @@ def test_what_is_written_is_read_again(tmp_path_factory: pytest.TempPathFactory,
         camera_files.dump(camera, folder / f"camera{suffix}", depth_unit=0.00025)
         assert camera_files.load(folder / f"camera{suffix}") == expected
     assert camera_files.read(folder / "camera.toml").depth_unit == 0.00025
+
+
+@pytest.mark.parametrize(
+    ("changed", "cause"),
+    [
+        ({"width": "640"}, "width"),
+        ({"width": None}, "width"),
+        ({"height": float("nan")}, "height"),
+        ({"height": float("inf")}, "height"),
+        ({"height": 480.5}, "height"),
+        ({"fx": "570"}, "fx"),
+        ({"cy": float("nan")}, "cy"),
+        ({"distortion_model": "brown_conrady", "distortion": ("x",)}, "distortion"),
+        ({"distortion_model": "mirror"}, "mirror"),
+    ],
+)
+def test_a_camera_that_can_not_be_is_refused_by_field(changed: dict[str, object], cause: str) -> None:
+    plain: dict[str, object] = {"width": 640, "height": 480, "fx": 570.3, "fy": 570.3, "cx": 319.5, "cy": 239.5}
+    with pytest.raises(InputError, match=cause):
+        Camera(**{**plain, **changed})  # type: ignore[arg-type]

@@ -35,6 +35,7 @@ def test_every_form_of_the_same_frame_gives_the_same_pose() -> None:
         (np.round(DEPTH / 0.00001).astype(np.uint32), {"depth_unit": 0.00001}),
         (Frame(depth=raw, camera=CAMERA, depth_unit=0.0001), {}),
         (DEPTH.tolist(), {}),
+        (np.ma.masked_less(np.where(DEPTH > 5.3, 0.7, DEPTH), 1.0), {}),
         (points, {}),
         (points.reshape(-1, 3), {}),
     ]

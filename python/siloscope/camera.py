@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
+from numbers import Real
 from typing import Any
 
 import numpy as np
@@ -48,17 +49,19 @@ class Camera:
     distortion: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
+        if not all(map(_is_number, self.distortion)):
+            raise InputError(f"camera distortion is {self.distortion!r}; give the coefficients as numbers")
         object.__setattr__(self, "distortion", tuple(float(k) for k in self.distortion))
         for name in ("width", "height"):
             side = getattr(self, name)
-            if isinstance(side, bool) or int(side) != side or not 1 <= side <= 20_000:
+            if not _is_number(side) or not 1 <= side <= 20_000 or int(side) != side:
                 raise InputError(f"camera {name} is {side!r}; give a whole number of pixels between 1 and 20000")
             object.__setattr__(self, name, int(side))
         for name in ("fx", "fy", "cx", "cy"):
-            value = float(getattr(self, name))
-            if not math.isfinite(value) or (name in ("fx", "fy") and value <= 0.0):
-                raise InputError(f"camera {name} is {value}; give the sensor's own intrinsics with --camera FILE")
-            object.__setattr__(self, name, value)
+            value = getattr(self, name)
+            if not _is_number(value) or not math.isfinite(value) or (name in ("fx", "fy") and value <= 0.0):
+                raise InputError(f"camera {name} is {value!r}; give the sensor's own intrinsics with --camera FILE")
+            object.__setattr__(self, name, float(value))
         if self.distortion_model not in DISTORTION_MODELS:
             known = ", ".join(DISTORTION_MODELS)
             raise InputError(f"unknown distortion model '{self.distortion_model}'; known are {known}")
@@ -79,3 +82,7 @@ class Camera:
     def to_dict(self) -> dict[str, Any]:
         """Plain data with the fields' names, as in our TOML and JSON camera files."""
         return {**asdict(self), "distortion": list(self.distortion)}
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)

@@ -107,7 +107,9 @@ def _prepare_depth(
 
 
 def _frame(data: ArrayLike, camera: Camera | None) -> Frame:
-    """An array as a frame: (H, W) is depth, (H, W, 3) and (N, 3) are points."""
+    """An array as a frame: (H, W) is depth, (H, W, 3) and (N, 3) are points; what is masked is no measurement."""
+    if isinstance(data, np.ma.MaskedArray):
+        data = data.filled(np.nan if data.dtype.kind == "f" else 0)
     try:
         array = np.asarray(data)
     except (ValueError, TypeError) as error:

@@ -11,9 +11,14 @@ pub struct Workers {
 /// Items handled together: large enough that handing them out costs nothing beside the work.
 const CHUNK: usize = 64;
 
+/// Most threads that are started: a wrong number must not ask the system for millions.
+const MOST: usize = 256;
+
 impl Workers {
-    /// Workers on `threads` threads; 1 (or 0) starts none. Where the system refuses threads the caller's own is used.
+    /// Workers on `threads` threads, at most 256; 1 (or 0) starts none. Where the system refuses threads the caller's
+    /// own is used.
     pub fn new(threads: usize) -> Self {
+        let threads = threads.min(MOST);
         let build = || rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok();
         Self { pool: if threads > 1 { build() } else { None } }
     }
@@ -55,7 +60,7 @@ mod tests {
 
     #[test]
     fn the_number_of_threads_changes_nothing() {
-        for threads in [0, 1, 2, 5] {
+        for threads in [0, 1, 2, 5, usize::MAX] {
             let workers = Workers::new(threads);
             assert_eq!(workers.map(1000, |i| i * i), (0..1000).map(|i| i * i).collect::<Vec<_>>());
             let mut out = vec![0; 1001];

@@ -177,6 +177,8 @@ def surface_map(
     if cloud.dtype.kind not in "fiu" or cloud.ndim not in (2, 3) or cloud.shape[-1] != 3:
         raise InputError(f"points: {cloud.dtype} of shape {cloud.shape}; give (N, 3) or (H, W, 3) in metres")
     direction = np.asarray(up, np.float64)
+    if not 0.0 <= noise < np.inf:
+        raise UsageError(f"noise must be 0 m or more, got {noise}")
     if direction.shape != (3,):
         raise UsageError(f"up {direction.tolist()}: give three numbers")
     flat = np.ascontiguousarray(cloud.reshape(-1, 3), np.float64)
