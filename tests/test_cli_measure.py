@@ -116,6 +116,7 @@ def test_a_dark_frame_has_no_answer(place: Path, capsys: Shown) -> None:
         (["--diameter", "9"], 2),
         (["--top", "9"], 2),
         (["--top", "nan"], 2),
+        (["--top", "-1000"], 2),
         (["--outlet-diameter", "5"], 2),
         (["--strapping", "no.csv"], 3),
         (["--frame", "7"], 3),

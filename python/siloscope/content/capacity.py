@@ -17,6 +17,9 @@ from siloscope.estimate import SiloGeometry
 LARGEST_FILE = 10_000_000
 """Bytes of a strapping table."""
 
+LONGEST = 200.0
+"""Longest length of a silo, m."""
+
 LENGTH_STD = 0.01
 """Standard deviation of a length of a datasheet, m."""
 
@@ -38,8 +41,8 @@ class Datasheet:
     def __post_init__(self) -> None:
         for name, least in (("diameter", 0.01), ("cylinder", 0.0), ("cone", 0.0)):
             value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and least <= value <= 200.0):
-                raise UsageError(f"{name} must be between {least:g} and 200 m, got {value}")
+            if value is not None and not least <= value <= LONGEST:
+                raise UsageError(f"{name} must be between {least:g} and {LONGEST:g} m, got {value}")
         for name in ("outlet_diameter", "outlet_length"):
             if not 0.0 <= getattr(self, name) <= 20.0:
                 raise UsageError(f"{name.replace('_', '-')} must be between 0 and 20 m, got {getattr(self, name)}")

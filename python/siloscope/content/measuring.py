@@ -15,7 +15,7 @@ from siloscope import _core, sensors
 from siloscope.calibrate import calibrate
 from siloscope.calibration import Calibration
 from siloscope.camera import Camera
-from siloscope.content.capacity import Datasheet, Strapping
+from siloscope.content.capacity import LONGEST, Datasheet, Strapping
 from siloscope.content.density import Density, choose
 from siloscope.content.knowledge import WALL_STD, Knowledge, know, narrowed
 from siloscope.content.reading import Request, content_of, lengths_for_core, source_of
@@ -96,6 +96,8 @@ def measure(
     """
     start = time.perf_counter()
     chosen = choose(density, density_std, product)
+    if top is not None and not abs(top) <= LONGEST:
+        raise UsageError(f"top must be between -{LONGEST:g} and {LONGEST:g} m, got {top}")
     sheet = Datasheet(diameter, cylinder, cone, outlet_diameter, outlet_length)
     table = strapping if isinstance(strapping, Strapping | None) else Strapping.read(strapping)
     profile = None if sensor is None else sensors.load(sensor)
