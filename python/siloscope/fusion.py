@@ -28,6 +28,9 @@ AGREE = 2.58
 STARTS = 12
 """Frames from which the search for the majority's answer starts."""
 
+PIECE = 16
+"""Frames added up at a time."""
+
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
@@ -105,8 +108,8 @@ class Stack:
             shift = np.where(fixed, self.answers[None, :, SCALE] - centres[:, None, SCALE], 0.0)
             lengths = np.nan_to_num(centres)[:, None, list(LENGTHS)] * known[:, :, list(LENGTHS)]
             gaps[:, :, list(LENGTHS)] += shift[:, :, None] * lengths
-        across = np.einsum("kni,nij->knj", gaps, self.metric)
-        squared: Matrix = np.einsum("knj,knj->kn", across, gaps)
+        of_frame = gaps.transpose(1, 0, 2)
+        squared: Matrix = np.einsum("nkj,nkj->kn", of_frame @ self.metric, of_frame)
         return squared
 
 
@@ -172,12 +175,10 @@ def majority(stack: Stack, members: NDArray[np.bool_], starts: NDArray[np.intp],
 
 
 def _closest(stack: Stack, centres: Matrix, within: NDArray[np.bool_], half: NDArray[np.int_]) -> tuple[Matrix, Vector]:
-    """Weights (K, N) of the `half` frames closest to each centre, and the sum of their distances."""
+    """Weights (K, N) of the `half` frames closest to each centre (ties too), and the sum of their distances."""
     relative = np.where(within, stack.distances(centres) / np.maximum(stack.dof, 1), np.inf)
-    order = np.argsort(relative, axis=1, kind="stable")
-    ranks = np.empty_like(order)
-    np.put_along_axis(ranks, order, np.arange(stack.count)[None], axis=1)
-    chosen = ranks < half[:, None]
+    furthest = np.take_along_axis(np.sort(relative, axis=1), half[:, None] - 1, axis=1)
+    chosen = within & (relative <= furthest)
     return chosen.astype(float), np.where(chosen, relative, 0.0).sum(axis=1)
 
 
@@ -242,8 +243,16 @@ def _added(stack: Stack, weights: Matrix, origin: Vector) -> tuple[Matrix, Matri
     """``Σ w Λ`` (K, 12, 12) and ``Σ w (Λ (θ - origin) - g)`` (K, 12)."""
     gap = np.where(stack.seen, stack.answers - origin, 0.0)
     pulls = np.einsum("nij,nj->ni", stack.information, gap) - stack.gradient
-    information = np.einsum("kn,nij->kij", weights, stack.information)
-    return information, np.einsum("kn,ni->ki", weights, pulls)
+    both = np.concatenate([stack.information.reshape(-1, SIZE * SIZE), pulls], axis=1)
+    information, pull = np.split(_product(weights, both), [SIZE * SIZE], axis=1)
+    return information.reshape(-1, SIZE, SIZE), pull
+
+
+def _product(weights: Matrix, rows: Matrix) -> Matrix:
+    """``weights @ rows`` in pieces too small to be spread over threads, which take longer to wake than to work."""
+    pieces = [slice(first, first + PIECE) for first in range(0, rows.shape[0], PIECE)]
+    total: Matrix = sum((weights[:, piece] @ rows[piece] for piece in pieces), np.zeros((len(weights), rows.shape[1])))
+    return total
 
 
 def _systems(stack: Stack, weights: Matrix, base: Sums) -> tuple[Matrix, Matrix, Vector, NDArray[np.bool_]]:
@@ -264,12 +273,11 @@ def _systems(stack: Stack, weights: Matrix, base: Sums) -> tuple[Matrix, Matrix,
 
 def _origin(stack: Stack, base: Sums) -> Vector:
     """A point near the answer, so that sums about it keep their digits."""
-    seen = stack.seen.any(axis=0)
-    return np.where(
-        seen,
-        [np.median(a[s]) if s.any() else 0.0 for a, s in zip(stack.answers.T, stack.seen.T, strict=True)],
-        base.origin,
-    )
+    count = stack.seen.sum(axis=0)
+    if not stack.count:
+        return base.origin
+    middle = np.sort(stack.answers, axis=0)[count // 2, np.arange(SIZE)]
+    return np.where(count > 0, middle, base.origin)
 
 
 def _with_covariance(stack: Stack, weights: Vector, base: Sums, centre: Vector, excess: float) -> Fused:
