@@ -77,6 +77,7 @@ BAD: dict[str, tuple[Any, dict[str, Any], type[SiloscopeError], str]] = {
         InputError,
         "unit",
     ),
+    "map coordinates": (np.ones((500, 3)) * (5e5, 4e6, 100.0), {}, InputError, "4031 km"),
     "unknown method": (DEPTH, {"method": "magic"}, UsageError, "method"),
     "unknown sensor": (DEPTH, {"sensor": "magic"}, UsageError, "sensor"),
     "negative diameter": (DEPTH, {"diameter": -1.0}, UsageError, "diameter"),

@@ -19,6 +19,9 @@ from siloscope.sensors import SensorProfile
 LONGEST = 1000.0
 """Depth in metres beyond which a floating-point frame can't be in metres."""
 
+FARTHEST_CLOUD = 10_000.0
+"""Distance of a cloud from the origin, m, from which on the origin can't be its sensor."""
+
 SENTINEL = 65535
 """Raw 16-bit depth that means "no measurement"."""
 
@@ -70,6 +73,7 @@ def prepare(
         points = points[np.isfinite(points).all(axis=1)]
         points = points if box is None else points[within(points, box)]
         _not_empty(len(points), frame.source)
+        _near_the_sensor(points, frame.source)
         return Prepared(None, None, np.ascontiguousarray(points), frame.gravity, config)
     return _prepare_depth(frame, profile, mask, box, config)
 
@@ -228,3 +232,13 @@ def within(points: NDArray[np.floating[Any]], box: NDArray[np.float64]) -> NDArr
 def _not_empty(count: int, source: str) -> None:
     if count == 0:
         raise InputError(f"{source}: no valid point is left; check the file, the mask and the crop box")
+
+
+def _near_the_sensor(points: NDArray[np.float64], source: str) -> None:
+    """Refuses map coordinates: the origin is where the sensor is."""
+    away = float(np.linalg.norm(np.median(points, axis=0)))
+    if away > FARTHEST_CLOUD:
+        raise InputError(
+            f"{source}: the points lie {away / 1000:.0f} km from the origin, as map coordinates do; subtract the "
+            "sensor's place from them"
+        )

@@ -18,3 +18,8 @@ def with_std(value: float | None, std: float | None, factor: float, unit: str) -
 def printable(name: str) -> str:
     """A file's name as text that can be encoded: bytes in it that are no UTF-8, as in old archives, become "?"."""
     return name.encode("utf-8", "replace").decode("utf-8")
+
+
+def counted(number: int, noun: str) -> str:
+    """``1 file``, ``3 files``."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

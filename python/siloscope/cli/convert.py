@@ -13,6 +13,7 @@ from siloscope.cli.outcome import PARTIAL, print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.conversion import Sink, open_sink
 from siloscope.frames import FrameSource
+from siloscope.wording import counted
 
 
 def convert(
@@ -53,7 +54,7 @@ def convert(
     if as_json:
         print_json(document)
     else:
-        say(f"{document['frames']} frames written to {out}")
+        say(f"{counted(document['frames'], 'frame')} written to {out}")
     return PARTIAL if document["problems"] else 0
 
 

@@ -19,6 +19,7 @@ from siloscope.estimate import Estimate
 from siloscope.frame import Frame
 from siloscope.inputs import metres
 from siloscope.region import Mask
+from siloscope.wording import counted
 
 
 def locate(
@@ -101,4 +102,4 @@ def _write(out: Path, frame: Frame, estimate: Estimate, shown: Mask | None) -> N
 
     with writing(out):
         written = write_results(out, frame, estimate, shown)
-    say(f"wrote {len(written)} files to {out}")
+    say(f"wrote {counted(len(written), 'file')} to {out}")

@@ -18,7 +18,7 @@ from siloscope.cli.progress import say
 from siloscope.cli.summary import headline
 from siloscope.content import Content
 from siloscope.frame import Frame
-from siloscope.wording import with_std
+from siloscope.wording import counted, with_std
 
 CalibrationFile = Annotated[
     Path | None, typer.Option("--calibration", metavar="FILE", help="What `calibrate` wrote: pose and geometry.")
@@ -112,7 +112,7 @@ def _answer(content: Content, out: Path | None, as_json: bool) -> int:
 
         with writing(out):
             written = write_content(out, content)
-        say(f"wrote {len(written)} files to {out}")
+        say(f"wrote {counted(len(written), 'file')} to {out}")
     if as_json:
         print_json(content.to_dict())
     else:

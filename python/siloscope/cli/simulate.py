@@ -18,6 +18,7 @@ from siloscope.errors import UsageError
 from siloscope.paper.scenarios import SCENARIOS, scenario
 from siloscope.pose import SiloPose
 from siloscope.scene import DEFECTS, Feed, Scene, SimulatedFrame, defects, discharge, sensor_model
+from siloscope.wording import counted
 
 MOST_STEPS = 100_000
 """Frames of one discharge."""
@@ -25,30 +26,28 @@ MOST_STEPS = 100_000
 PERFECT_UNIT = 0.00025
 """Metres per raw unit where no sensor names one: fine for a perfect silo, and 16 bits still reach 16 m."""
 
-_SCENARIO = typer.Option(help=f"Silo, camera and pose to start from: {', '.join(SCENARIOS)}.")
-_FEED = typer.Option(
-    help="gaussian, funnel, mound or flat, with any of tilted, lumpy, rathole after '+'; none for empty."
-)
-_LEVEL = typer.Option(help="Highest feed point as a share of the silo's height; of the first frame, with --steps.")
-_SENSOR = typer.Option(help="perfect, astra-s (Eqs. 8-10), another profile's name, or a profile's TOML file.")
-_DEFECTS = typer.Option(help=f"Real walls and clutter, joined by commas: {', '.join(DEFECTS)}; or all.")
+_SCENARIO = f"Silo, camera and pose to start from: {', '.join(SCENARIOS)}."
+_FEED = "gaussian, funnel, mound or flat, with any of tilted, lumpy, rathole after '+'; none for empty."
+_LEVEL = "Highest feed point as a share of the silo's height; of the first frame, with --steps."
+_SENSOR = "perfect, astra-s (Eqs. 8-10), another profile's name, or a profile's TOML file."
+_DEFECTS = f"Real walls and clutter, joined by commas: {', '.join(DEFECTS)}; or all."
 
 
 def simulate(
     out: Annotated[Path, typer.Option(help="Folder to write into; made where it is missing, else it must be empty.")],
-    scenario_name: Annotated[str, typer.Option("--scenario", help=_SCENARIO.help)] = "silo1",
+    scenario_name: Annotated[str, typer.Option("--scenario", help=_SCENARIO)] = "silo1",
     radius: Annotated[float | None, typer.Option(help="Radius of the cylinder, m.")] = None,
     cylinder: Annotated[float | None, typer.Option(help="Height of the cylinder, m.")] = None,
     cone: Annotated[float | None, typer.Option(help="Height of the cone, m.")] = None,
     outlet: Annotated[float | None, typer.Option(help="Radius of the outlet pipe, m.")] = None,
     outlet_offset: Annotated[str | None, typer.Option(help="Offset x,y of the outlet from the axis, m.")] = None,
     pose: Annotated[str | None, typer.Option(help="r_x,r_y,t_x,t_y in rad and m.")] = None,
-    feed: Annotated[str | None, typer.Option(help=_FEED.help)] = None,
-    level: Annotated[float | None, typer.Option(help=_LEVEL.help)] = None,
+    feed: Annotated[str | None, typer.Option(help=_FEED)] = None,
+    level: Annotated[float | None, typer.Option(help=_LEVEL)] = None,
     steps: Annotated[int | None, typer.Option(help="Frames of a discharge, down to the empty silo.")] = None,
-    sensor: Annotated[str | None, typer.Option(help=_SENSOR.help)] = None,
+    sensor: Annotated[str | None, typer.Option(help=_SENSOR)] = None,
     device: Annotated[int | None, typer.Option(help="Draws one device's bias from the sensor's profile.")] = None,
-    defect_names: Annotated[str | None, typer.Option("--defects", help=_DEFECTS.help)] = None,
+    defect_names: Annotated[str | None, typer.Option("--defects", help=_DEFECTS)] = None,
     dust: Annotated[float | None, typer.Option(help="Share of pixels that read dust.")] = None,
     dropout: Annotated[float | None, typer.Option(help="Share of pixels without measurement.")] = None,
     flying: Annotated[float | None, typer.Option(help="Share of edge pixels that fly between two surfaces.")] = None,
@@ -94,7 +93,7 @@ def simulate(
     if as_json:
         print_json(document)
     else:
-        say(f"{len(scenes)} {'frame' if len(scenes) == 1 else 'frames'}, camera.json and truth.json in {out}")
+        say(f"{counted(len(scenes), 'frame')}, camera.json and truth.json in {out}")
 
 
 def _given(**options: Any) -> dict[str, Any]:

@@ -22,7 +22,7 @@ from siloscope.cli.progress import track as bar
 from siloscope.errors import UsageError
 from siloscope.frames import FrameSource
 from siloscope.tracking.story import Reading, Track
-from siloscope.wording import with_std
+from siloscope.wording import counted, with_std
 
 SHOWN = 40
 """Readings that the table on a terminal has; files have all."""
@@ -88,7 +88,7 @@ def _answer(found: Track, out: Path | None, parquet: bool, lines: bool, as_json:
 
         with writing(out):
             written = write_track(out, found, parquet)
-        say(f"wrote {len(written)} files to {out}")
+        say(f"wrote {counted(len(written), 'file')} to {out}")
     if as_json:
         print_json(found.to_dict())
     elif lines:
