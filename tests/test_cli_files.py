@@ -161,3 +161,4 @@ def test_convert_refuses_what_one_output_cannot_hold(
     code, told = document(capsys, "convert", *call(folder, tmp_path))
     assert (code, told["exit_code"]) == (2, 2)
     assert cause in told["message"]
+    assert not (tmp_path / "a.ply").exists()

@@ -119,18 +119,21 @@ class PlySink:
     """One point cloud file, for one frame."""
 
     def __init__(self, out: Path, raw_unit: float | None) -> None:
-        self.out, self.files = out, list[Path]()
+        self.out, self.files = out, [out]
+        self._frame: Frame | None = None
 
     def add(self, frame: Frame) -> None:
-        """Writes the frame's points."""
-        if self.files:
+        """Keeps the frame until `finish`, so that a second one leaves no file behind."""
+        if self._frame is not None:
             raise UsageError(f"{self.out}: a PLY file takes one frame; name a folder for several")
-        points, labels = frame_points(frame)
-        writers.write_ply(self.out, points, labels=labels, comments=[f"from {Path(frame.source).name}"])
-        self.files.append(self.out)
+        self._frame = frame
 
     def finish(self) -> None:
-        """Nothing is left to write."""
+        """Writes the frame's points."""
+        if self._frame is not None:
+            points, labels = frame_points(self._frame)
+            comments = [f"from {Path(self._frame.source).name}"]
+            writers.write_ply(self.out, points, labels=labels, comments=comments)
 
 
 class ArchiveSink:

@@ -24,7 +24,7 @@ pub struct Vessel {
     pub ovality: [f64; 2],
 }
 
-/// Volume with its derivatives by the lengths of the geometry.
+/// Derivatives of a volume by the lengths of the geometry, m³/m.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Shells {
     /// Derivative by the radius.
