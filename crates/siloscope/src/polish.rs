@@ -2,7 +2,7 @@
 
 use crate::patches::{DepthImage, noise_from_scatter};
 use crate::pixels::{Sampling, tile_residual};
-use crate::refine::{Equation, Fit, Problem, System, tukey};
+use crate::refine::{Equation, Fit, Problem, System, tukey, tukey_slope};
 use crate::sensor::NoiseLaw;
 use crate::surface::{Parameters, PlacedSurface};
 
@@ -121,8 +121,13 @@ fn noise_factor(equations: &[TileEquation]) -> f64 {
     (median / MEDIAN_OF_CHI_SQUARE).clamp(1e-3, 1.0)
 }
 
-/// A step this small is the last, in squared standard deviations.
-const SETTLED: f64 = 1e-4;
+/// A step this small is the last, in squared standard deviations; the next would be a hundredth of it.
+const SETTLED: f64 = 0.01;
+/// The misfit has settled where it changes by no more than this share of it.
+const SAME_MISFIT: f64 = 0.01;
+
+/// Most that a step is made longer by.
+const LONGER: f64 = 1.4;
 
 /// Robust solution of linear equations: reweighted a few times, the misfit re-estimated on the way.
 ///
@@ -138,18 +143,24 @@ pub fn solve_equations(
     equations.iter_mut().for_each(|e| e.allow(fit.misfit));
     for _ in 0..rounds {
         system = System::with_prior(problem.prior, fit);
+        let (mut weights, mut slopes) = (0.0, 0.0);
         for TileEquation { equation: e, .. } in equations.iter() {
-            system.add(e, tukey(e.residual * e.residual / e.variance));
+            let squared = e.residual * e.residual / e.variance;
+            let weight = tukey(squared);
+            system.add(e, weight);
+            weights += weight;
+            slopes += tukey_slope(squared);
         }
         // the residuals are already moved by `total`, the prior is not
         system.gradient += system.prior * total;
-        let step = system.solve(fit)?;
+        // with weights in place of slopes the step falls short by their ratio
+        let step = system.solve(fit)? * (weights / slopes).clamp(1.0, LONGER);
         total += step;
         equations.iter_mut().for_each(|e| e.equation.residual += e.equation.jacobian.dot(&step));
         let before = fit.misfit;
         fit.misfit = misfit_of(equations);
         equations.iter_mut().for_each(|e| e.allow(fit.misfit));
-        if -system.gradient.dot(&step) < SETTLED && (fit.misfit / before - 1.0).abs() < SETTLED.sqrt() {
+        if -system.gradient.dot(&step) < SETTLED && (fit.misfit / before - 1.0).abs() < SAME_MISFIT {
             break;
         }
     }

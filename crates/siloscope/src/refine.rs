@@ -226,6 +226,13 @@ pub fn tukey(squared: f64) -> f64 {
     if t <= 0.0 { 0.0 } else { t * t }
 }
 
+/// Derivative of residual × weight by the residual, for a squared residual in units of its variance.
+#[inline]
+pub fn tukey_slope(squared: f64) -> f64 {
+    let t = squared / (TUKEY * TUKEY);
+    if t >= 1.0 { 0.0 } else { (1.0 - t) * (1.0 - 5.0 * t) }
+}
+
 /// What the agreeing patches' distances from the wall need beside the noise; at most halves in one step.
 fn next_misfit(now: f64, across: &mut [f64], noise: f64) -> f64 {
     if across.is_empty() {
