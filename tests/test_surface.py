@@ -10,7 +10,9 @@ import pytest
 from siloscope import Estimate, SiloPose, sensors
 from siloscope.paper import metrics
 from siloscope.paper.scenarios import random_scene, scenario
+from siloscope.paper.stand_ins import IRREGULAR, real_silo
 from siloscope.scene import ASTRA_S, Feed, Scene, defects
+from siloscope.sensors import SensorProfile
 from siloscope.surface import fit_depth, reasons
 
 NAMES = ("silo1", "silo2", "silo3")
@@ -37,6 +39,22 @@ def test_exact_frames_give_the_exact_pose_and_silo(name: str) -> None:
     truth = scene.silo.geometry
     assert estimate.silo.apex == pytest.approx(truth.apex, abs=1e-5)
     assert estimate.silo.radius == pytest.approx(truth.radius, abs=1e-5)
+
+
+LENSES = {
+    "brown_conrady": (-0.28, 0.08, 0.001, -0.001, 0.0),
+    "kannala_brandt": (0.05, -0.02, 0.01, 0.0),
+}
+
+
+@pytest.mark.parametrize("model", LENSES)
+@pytest.mark.parametrize("name", ["silo2", "silo3"])
+def test_a_distorted_lens_costs_no_accuracy(name: str, model: str) -> None:
+    scene = scenario(name)
+    bent = replace(scene, camera=replace(scene.camera, distortion_model=model, distortion=LENSES[model]))
+    depth = np.nan_to_num(bent.render().depth).astype(np.float32)
+    found = fit_depth(depth, bent.camera, SensorProfile("exact", noise=(5e-4, 0, 0, 0, 0, 1)))
+    assert gap(found, bent) < 1e-3  # with straight lines between a tile's corners: up to 1e-2
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -92,9 +110,29 @@ def test_a_narrow_view_of_an_oval_silo_is_covered_by_the_stated_deviation() -> N
     assert np.all(np.abs(error) < 3.0 * np.sqrt(found.covariance.diagonal()))
 
 
+@pytest.mark.parametrize("level", [0.05, 0.2, 0.35])
+def test_a_farms_silo_is_found_with_nothing_known_of_its_sensor(level: float) -> None:
+    silo = real_silo("silo-r2", 12)
+    scene = replace(silo, feed=replace(IRREGULAR, level=level))
+    found = fit(scene, None)
+    assert found.pose is not None, found.message
+    assert found.covariance is not None
+    error = np.array([getattr(found.pose, k) - getattr(scene.pose, k) for k in ("r_x", "r_y", "t_x", "t_y")])
+    assert np.all(np.abs(error) < 2.5 * np.sqrt(found.covariance.diagonal()))
+    assert gap(found, scene) < 30.0
+
+
 def test_an_auger_in_view_is_no_silo_seen_from_outside() -> None:
     scene = in_use(1056, "funnel", 0.2966, "film,auger,dents,oval")
     assert fit(scene, "orbbec-astra-s").status == "refused"
+
+
+@pytest.mark.parametrize("seed", [302, 308, 313, 335])
+def test_a_funnel_of_feed_below_an_auger_is_not_taken_for_the_cone(seed: int) -> None:
+    scene = in_use(seed, "funnel", 0.3 + 0.01 * (seed % 30), "auger")
+    found = fit(scene, "orbbec-astra-s")
+    assert found.pose is not None, found.message
+    assert found.silo.apex is None or found.silo.apex == pytest.approx(scene.silo.geometry.apex, abs=0.05)
 
 
 def test_every_reason_has_a_meaning_and_advice() -> None:

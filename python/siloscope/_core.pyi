@@ -102,19 +102,27 @@ def shape_tensor_points(
     points: NDArray[np.float64], settings: tuple[float, int, str, float, float, int, int]
 ) -> dict[str, Any]: ...
 def vessel_volume_below(silo: tuple[float, ...], z: list[float]) -> list[float]: ...
+
+@final
+class ContentSetup:
+    def __new__(
+        cls,
+        pose: tuple[float, ...],
+        silo: tuple[float, ...],
+        covariance: NDArray[np.float64],
+        wall_std: float,
+        bias: tuple[float, ...],
+        noise: tuple[float, ...],
+        noise_known: bool,
+        range: tuple[float, float],
+    ) -> ContentSetup: ...
+
 def content_measure(
-    data: NDArray[np.float32],
-    camera: Any | None,
-    rays: NDArray[np.float64] | None,
-    pose: tuple[float, ...],
-    silo: tuple[float, ...],
-    covariance: NDArray[np.float64],
-    wall_std: float,
-    bias: tuple[float, ...],
-    noise: tuple[float, ...],
-    noise_known: bool,
-    range: tuple[float, float],
+    data: NDArray[np.float32], camera: Any | None, rays: NDArray[np.float64] | None, setup: ContentSetup
 ) -> tuple[dict[str, Any], ContentSurface | None]: ...
+def content_bare_reach(
+    data: NDArray[np.float32], camera: Any | None, rays: NDArray[np.float64] | None, setup: ContentSetup
+) -> tuple[float, float] | None: ...
 def content_relief(
     points: NDArray[np.float64], up: tuple[float, float, float], cell: float | None, noise: float
 ) -> ContentSurface | None: ...

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -10,7 +9,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from siloscope import writers
+from siloscope import documents, writers
 from siloscope.errors import InputError, UsageError
 from siloscope.frame import Frame
 from siloscope.frames import archive
@@ -74,7 +73,7 @@ class FolderSink:
         self.files.append(self.out / FRAME_LIST)
         unit = None if self._first is None else self._first.depth_unit
         document = {"schema": "siloscope.frames/1", "depth_unit": unit, "frames": self._rows}
-        (self.out / FRAME_LIST).write_text(json.dumps(plain(document), indent=1) + "\n", encoding="utf-8")
+        documents.write(self.out / FRAME_LIST, document)
 
 
 class NpzSink:
@@ -111,7 +110,7 @@ class NpzSink:
             timestamps=times if len(times) == whole else None,
             gravity=first.gravity,
             labels=(labels[0] if single else np.stack(labels)) if len(labels) == whole else None,
-            provenance=json.dumps(plain([description(frame) for frame in self._frames])),
+            provenance=documents.text([description(frame) for frame in self._frames]),
         )
 
 
@@ -188,7 +187,9 @@ def metres(frame: Frame) -> tuple[Any, Any]:
     """Depth (H, W) in metres and where it is measured."""
     depth = np.asarray(frame.depth)
     if depth.dtype == np.uint16:
-        return depth * float(frame.depth_unit or 0.0), (depth > 0) & (depth < 65_535)
+        if frame.depth_unit is None:
+            raise InputError(f"{frame.source}: depth in raw units and nothing says how long one is; give --depth-unit")
+        return depth * frame.depth_unit, (depth > 0) & (depth < 65_535)
     return depth.astype(np.float64), np.isfinite(depth) & (depth > 0)
 
 
@@ -201,20 +202,3 @@ def description(frame: Frame) -> dict[str, Any]:
 def _stacks(frame: Frame, first: Frame) -> bool:
     one, other = np.asarray(frame.depth), np.asarray(first.depth)
     return one.shape == other.shape and one.dtype == other.dtype
-
-
-def plain(value: Any) -> Any:
-    """A value as JSON has it: arrays as lists, what is no number as null, what is unknown as text."""
-    match value:
-        case dict():
-            return {str(key): plain(entry) for key, entry in value.items()}
-        case list() | tuple():
-            return [plain(entry) for entry in value]
-        case np.ndarray() | np.generic():
-            return plain(value.tolist())
-        case float():
-            return value if np.isfinite(value) else None
-        case None | bool() | int() | str():
-            return value
-        case _:
-            return str(value)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope import writers
+from siloscope import documents, writers
 from siloscope.camera import Camera
 from siloscope.errors import SiloscopeError
 from siloscope.estimate import Estimate
@@ -33,8 +32,7 @@ def write_results(directory: Path, frame: Frame, estimate: Estimate, mask: Mask 
 
     frame = _with_camera(frame, estimate)
     directory.mkdir(parents=True, exist_ok=True)
-    document = directory / "estimate.json"
-    document.write_text(json.dumps(estimate.to_dict(), indent=2) + "\n", "utf-8")
+    document = documents.write(directory / "estimate.json", estimate.to_dict())
     written = [document, *_adjusted(directory, frame, estimate)]
     return written + [save(made, directory / f"{name}.png") for name, made in pictures(frame, estimate, mask).items()]
 

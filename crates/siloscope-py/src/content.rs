@@ -11,7 +11,7 @@ use siloscope::content::classify::Thing;
 use siloscope::content::cloud::Relief;
 use siloscope::content::doubt::Covariance;
 use siloscope::content::fit::Surface;
-use siloscope::content::measure::{Content, Setup, measure, shape_of};
+use siloscope::content::measure::{Content, Setup, bare_reach, measure, shape_of};
 use siloscope::content::returns::{Rays, Source};
 use siloscope::content::shape::{Form, Shape};
 use siloscope::content::vessel::Vessel;
@@ -36,60 +36,101 @@ fn vessel_volume_below(silo: [f64; 8], z: Vec<f64>) -> PyResult<Vec<f64>> {
     Ok(z.into_iter().map(|z| vessel.volume_below(z)).collect())
 }
 
+/// What is known before the frame, as the core takes it.
+#[pyclass(frozen, module = "siloscope._core")]
+struct ContentSetup(Setup);
+
+#[pymethods]
+impl ContentSetup {
+    #[new]
+    #[pyo3(signature = (pose, silo, covariance, wall_std, bias, noise, noise_known, range))]
+    #[allow(clippy::too_many_arguments)]
+    fn new(
+        pose: [f64; 4],
+        silo: [f64; 8],
+        covariance: PyReadonlyArray2<'_, f64>,
+        wall_std: f64,
+        bias: [f64; 3],
+        noise: [f64; 6],
+        noise_known: bool,
+        range: [f64; 2],
+    ) -> PyResult<Self> {
+        Ok(Self(Setup {
+            pose: SiloPose { r_x: pose[0], r_y: pose[1], t_x: pose[2], t_y: pose[3] },
+            vessel: vessel(silo),
+            covariance: matrix(&covariance)?,
+            wall_std,
+            bias: DepthBias { offset: bias[0], scale: bias[1], quadratic: bias[2] },
+            noise: noise_law(noise),
+            noise_known,
+            range,
+        }))
+    }
+}
+
 /// Measures the content of a depth image (float32 (H, W), metres, with its camera) or of points (float32 (N, 3)).
 ///
 /// `rays` (H, W, 2) are needed where the camera's lens distorts. Returns plain numbers, and the surface or None.
 #[pyfunction]
-#[pyo3(signature = (data, camera, rays, pose, silo, covariance, wall_std, bias, noise, noise_known, range))]
-#[allow(clippy::too_many_arguments)]
 fn content_measure<'py>(
     py: Python<'py>,
     data: PyReadonlyArray2<'py, f32>,
     camera: Option<&Bound<'py, PyAny>>,
     rays: Option<PyReadonlyArray3<'py, f64>>,
-    pose: [f64; 4],
-    silo: [f64; 8],
-    covariance: PyReadonlyArray2<'py, f64>,
-    wall_std: f64,
-    bias: [f64; 3],
-    noise: [f64; 6],
-    noise_known: bool,
-    range: [f64; 2],
+    setup: &ContentSetup,
 ) -> PyResult<(Bound<'py, PyDict>, Option<ContentSurface>)> {
+    let content = with_source(py, &data, camera, rays.as_ref(), |source| measure(source, &setup.0))?;
+    Ok((report(py, &content)?, ContentSurface::of_content(content)))
+}
+
+/// Distance from the axis of the farthest bare wall that a frame shows, and the size of the cells that tell; or None.
+#[pyfunction]
+fn content_bare_reach<'py>(
+    py: Python<'py>,
+    data: PyReadonlyArray2<'py, f32>,
+    camera: Option<&Bound<'py, PyAny>>,
+    rays: Option<PyReadonlyArray3<'py, f64>>,
+    setup: &ContentSetup,
+) -> PyResult<Option<[f64; 2]>> {
+    with_source(py, &data, camera, rays.as_ref(), |source| bare_reach(source, &setup.0))
+}
+
+/// Runs something on a depth image or on points, without the interpreter's lock.
+fn with_source<'py, T: Send>(
+    py: Python<'py>,
+    data: &PyReadonlyArray2<'py, f32>,
+    camera: Option<&Bound<'py, PyAny>>,
+    rays: Option<&PyReadonlyArray3<'py, f64>>,
+    run: impl Fn(Source<'_>) -> siloscope::Result<T> + Send + Sync,
+) -> PyResult<T> {
     let camera = camera.map(convert::camera).transpose()?;
-    let setup = Setup {
-        pose: SiloPose { r_x: pose[0], r_y: pose[1], t_x: pose[2], t_y: pose[3] },
-        vessel: vessel(silo),
-        covariance: matrix(&covariance)?,
-        wall_std,
-        bias: DepthBias { offset: bias[0], scale: bias[1], quadratic: bias[2] },
-        noise: noise_law(noise),
-        noise_known,
-        range,
-    };
     let shape = (data.shape()[0], data.shape()[1]);
     let numbers = data.as_slice().map_err(value_error)?;
-    let rays = rays.as_ref().map(|r| r.as_slice()).transpose().map_err(value_error)?;
-    let content = match &camera {
-        None if shape.1 == 3 => py.detach(|| measure(Source::Points(numbers.as_chunks::<3>().0), &setup)),
+    let rays = rays.map(|r| r.as_slice()).transpose().map_err(value_error)?;
+    let found = match &camera {
+        None if shape.1 == 3 => py.detach(|| run(Source::Points(numbers.as_chunks::<3>().0))),
         None => return Err(value_error(format!("points have shape {shape:?}, expected (N, 3)"))),
         Some(camera) if (camera.height, camera.width) != shape => {
             let expected = (camera.height, camera.width);
             return Err(value_error(format!("the depth has shape {shape:?}, its camera {expected:?}")));
         }
-        Some(camera) => py.detach(|| measure_image(numbers, camera, rays, &setup)),
+        Some(camera) => py.detach(|| with_rays(numbers, camera, rays, &run)),
     };
-    let content = content.map_err(value_error)?;
-    Ok((report(py, &content)?, ContentSurface::of_content(content)))
+    found.map_err(value_error)
 }
 
-fn measure_image(depth: &[f32], camera: &Camera, rays: Option<&[f64]>, setup: &Setup) -> siloscope::Result<Content> {
+fn with_rays<T>(
+    depth: &[f32],
+    camera: &Camera,
+    rays: Option<&[f64]>,
+    run: &impl Fn(Source<'_>) -> siloscope::Result<T>,
+) -> siloscope::Result<T> {
     if let Some(rays) = rays {
-        return measure(Source::Depth(depth, Rays::Each(rays.as_chunks::<2>().0, camera.width)), setup);
+        return run(Source::Depth(depth, Rays::Each(rays.as_chunks::<2>().0, camera.width)));
     }
     let columns: Vec<f32> = (0..camera.width).map(|u| camera.ray(u as f64, camera.cy)[0] as f32).collect();
     let rows: Vec<f32> = (0..camera.height).map(|v| camera.ray(camera.cx, v as f64)[1] as f32).collect();
-    measure(Source::Depth(depth, Rays::Pinhole(&columns, &rows)), setup)
+    run(Source::Depth(depth, Rays::Pinhole(&columns, &rows)))
 }
 
 fn matrix(covariance: &PyReadonlyArray2<'_, f64>) -> PyResult<Covariance> {
@@ -278,6 +319,8 @@ fn content_relief(
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(vessel_volume_below, m)?)?;
     m.add_function(wrap_pyfunction!(content_measure, m)?)?;
+    m.add_function(wrap_pyfunction!(content_bare_reach, m)?)?;
+    m.add_class::<ContentSetup>()?;
     m.add_function(wrap_pyfunction!(content_relief, m)?)?;
     m.add_class::<ContentSurface>()
 }

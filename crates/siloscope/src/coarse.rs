@@ -1,6 +1,6 @@
 //! From start values to a fit on patches that stands up to the evidence.
 
-use crate::patches::{NONE, Patches};
+use crate::patches::{NONE, Patch, Patches};
 use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, NoiseLaw};
@@ -152,24 +152,48 @@ fn without_feed(problem: &Problem, fit: Fit) -> Result<Fit, Refusal> {
     Ok(alone)
 }
 
-/// Whether something else lies well before the cone all around its vertex: then the cone is no surface of feed.
+/// Whether feed lies well before the cone at its vertex and all around it: then the cone is no surface of feed itself.
 ///
-/// A funnel of feed also has a rounded tip, which lies a little before its own cone.
+/// A funnel of feed also has a rounded tip, which lies a little before its own cone. And an auger may stand over it: that
+/// covers the tip, but to its sides more of the cone than elsewhere.
 fn apex_is_covered(problem: &Problem, fit: &Fit) -> bool {
-    let placed = PlacedSurface::new(fit.surface);
-    let (reach, cover) = (0.06 * fit.surface.size(), 0.08 * fit.surface.size());
-    let (mut near, mut covered) = (0, 0);
-    for patch in &problem.patches.list {
+    const SECTORS: usize = 4;
+    const EVEN: f64 = 0.5;
+    let tip = before_the_cone(problem, fit, 0.06);
+    let disc = before_the_cone(problem, fit, 0.3);
+    let share = |sector: usize| {
+        let of_sector = disc.iter().filter(|(azimuth, _)| sector_of(*azimuth, SECTORS) == sector);
+        share_above(of_sector, 0.01)
+    };
+    let shares: [f64; SECTORS] = std::array::from_fn(share);
+    let (least, most) = (shares.iter().copied().fold(1.0, f64::min), shares.iter().copied().fold(0.0, f64::max));
+    tip.len() >= 4 && share_above(tip.iter(), 0.08) >= 0.7 && least > EVEN * most
+}
+
+fn sector_of(azimuth: f64, sectors: usize) -> usize {
+    let turn = azimuth / std::f64::consts::TAU + 0.5;
+    ((turn * sectors as f64) as usize).min(sectors - 1)
+}
+
+fn share_above<'a>(places: impl Iterator<Item = &'a (f64, f64)>, bar: f64) -> f64 {
+    let (count, above) = places.fold((0, 0), |(n, above), (_, before)| (n + 1, above + i32::from(*before > bar)));
+    f64::from(above) / f64::from(count.max(1))
+}
+
+/// Azimuth of the patches within `reach` of the axis, and how far they surely lie before the cone. Lengths are shares of
+/// the silo's size.
+fn before_the_cone(problem: &Problem, fit: &Fit, reach: f64) -> Vec<(f64, f64)> {
+    if problem.patches.cloud {
+        return Vec::new();
+    }
+    let (placed, size) = (PlacedSurface::new(fit.surface), fit.surface.size());
+    let before = |patch: &Patch| {
         let (d, part) = placed.depth(&patch.q);
         let p = placed.to_silo(&(patch.q * d));
-        if problem.patches.cloud || part != Part::Cone || p.x.hypot(p.y) > reach {
-            continue;
-        }
-        let before = d - fit.bias.true_depth(patch.measured);
-        near += 1;
-        covered += i32::from(before > cover + 4.0 * problem.noise.sigma(d) / patch.count.sqrt());
-    }
-    near >= 4 && covered * 10 >= near * 7
+        let sure = d - fit.bias.true_depth(patch.measured) - 4.0 * problem.noise.sigma(d) / patch.count.sqrt();
+        (part == Part::Cone && p.x.hypot(p.y) < reach * size).then(|| (p.y.atan2(p.x), sure / size))
+    };
+    problem.patches.list.iter().filter_map(before).collect()
 }
 
 /// Least share of an image that a body fills that is looked at from outside.

@@ -185,6 +185,10 @@ impl TileEquation {
     }
 }
 
+/// How true a tile's mean is at best, metres: its pixels are held against a quadratic. A smaller misfit would take the
+/// rest for disagreement between tiles.
+const RESOLUTION: f64 = 1e-5;
+
 /// Misfit across the wall that the tiles' residuals need beside their noise.
 fn misfit_of(equations: &[TileEquation]) -> f64 {
     let mut excess: Vec<f64> = Vec::with_capacity(equations.len());
@@ -200,5 +204,5 @@ fn misfit_of(equations: &[TileEquation]) -> f64 {
     let middle = excess.len() / 2;
     let (_, &mut spread, _) = excess.select_nth_unstable_by(middle, f64::total_cmp);
     let (_, &mut noise, _) = noise.select_nth_unstable_by(middle, f64::total_cmp);
-    ((1.4826 * spread).powi(2) - 1.2 * noise).max(0.0).sqrt().max(1e-6)
+    ((1.4826 * spread).powi(2) - 1.2 * noise).max(0.0).sqrt().max(RESOLUTION)
 }

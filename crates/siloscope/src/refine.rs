@@ -142,6 +142,20 @@ impl Problem<'_> {
         self.contact_at(fit, placed, i, d).map(|contact| self.equation_of(placed, &contact))
     }
 
+    /// The equation of a contact, with its derivative on the wall where the depth bias is free.
+    ///
+    /// The bias trades against the pose along a weak direction, in which the noise in derivatives outweighs the frame.
+    #[inline]
+    fn stable_equation(&self, fit: &Fit, placed: &PlacedSurface, contact: &Contact, i: usize) -> Equation {
+        if self.patches.cloud || self.prior.bias_std[2] == 0.0 {
+            return self.equation_of(placed, contact);
+        }
+        let d = contact.d - contact.residual / fit.bias.slope(contact.d); // a Newton step along the ray to the wall
+        let on_wall = self.contact_at(fit, placed, i, d).unwrap_or(*contact);
+        let Contact { residual, variance, .. } = *contact;
+        self.equation_of(placed, &Contact { residual, variance, ..on_wall })
+    }
+
     #[inline]
     fn equation_of(&self, placed: &PlacedSurface, contact: &Contact) -> Equation {
         let Contact { residual, variance, cosine, part, d, p, at, rate, .. } = *contact;
@@ -194,7 +208,7 @@ impl Problem<'_> {
                 continue;
             }
             fit.weights[i] = weight;
-            let equation = self.equation_of(&placed, &contact);
+            let equation = self.stable_equation(fit, &placed, &contact, i);
             if bias_is_pinned {
                 system.add_leading::<SURFACE>(&equation.jacobian, equation.residual, weight / equation.variance);
             } else {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import json
 import math
 import time
 from collections.abc import Iterable, Iterator
@@ -19,9 +18,9 @@ from rich.live import Live
 from rich.text import Text
 
 import siloscope
-from siloscope import camera_files
+from siloscope import camera_files, documents
 from siloscope.cli import options
-from siloscope.cli.outcome import PARTIAL, finite
+from siloscope.cli.outcome import PARTIAL
 from siloscope.cli.progress import say
 from siloscope.cli.summary import pose_table, ratios_line, silo_line, tilt_line
 from siloscope.errors import InputError
@@ -103,7 +102,7 @@ class _Lines:
     def __call__(self, frame: Frame, estimate: Estimate, turn: str | None, seconds: float) -> None:
         document = {**estimate.to_dict(), "schema": "siloscope.live/1", "frame": frame.source}
         document |= {"timestamp": frame.timestamp, "turn": turn, "seconds": seconds}
-        print(json.dumps(finite(document), allow_nan=False), flush=True)
+        print(documents.text(document), flush=True)
 
 
 class _Panel:

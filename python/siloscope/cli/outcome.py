@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import json
 import os
 import sys
 import traceback
@@ -13,9 +12,9 @@ from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import typer
 
+from siloscope import documents
 from siloscope.errors import SiloscopeError, UsageError
 
 REFUSED = 4
@@ -58,7 +57,7 @@ def guarded(run: Callable[[], Any], arguments: Sequence[str]) -> int:
 
 def print_json(document: Any) -> None:
     """Print the one JSON document of a command; NaN and infinities become null."""
-    print(json.dumps(finite(document), indent=2, allow_nan=False))
+    print(documents.text(document, 2))
 
 
 def check_place(file: Path) -> None:
@@ -140,18 +139,3 @@ def _silence_stdout() -> None:
     """Keeps the interpreter from complaining about the closed pipe when it flushes at exit."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-
-
-def finite(value: Any) -> Any:
-    """A value as JSON has it: arrays as lists, NaN and infinities as null."""
-    if isinstance(value, dict):
-        return {str(key): finite(entry) for key, entry in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [finite(entry) for entry in value]
-    if isinstance(value, np.ndarray):
-        return finite(value.tolist())
-    if isinstance(value, np.generic):
-        return finite(value.item())
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value

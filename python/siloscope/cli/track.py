@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -14,6 +13,7 @@ from rich.markup import escape
 from rich.table import Table
 
 import siloscope
+from siloscope import documents
 from siloscope.cli import measure as one
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, REFUSED, print_json, writing
@@ -93,7 +93,7 @@ def _answer(found: Track, out: Path | None, parquet: bool, lines: bool, as_json:
         print_json(found.to_dict())
     elif lines:
         for reading in found.readings:
-            print(json.dumps(reading.to_dict(), allow_nan=False))
+            print(documents.text(reading.to_dict()))
     else:
         _print(found)
     counts = found.counts

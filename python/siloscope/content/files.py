@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import csv
-import json
 from pathlib import Path
 
+from siloscope import documents
 from siloscope.content.result import Content
 from siloscope.content.surface_map import KINDS, SurfaceMap
 
@@ -22,9 +22,7 @@ def write_content(directory: Path, content: Content) -> list[Path]:
     from siloscope.plots.content import pictures
 
     directory.mkdir(parents=True, exist_ok=True)
-    document = directory / "content.json"
-    document.write_text(json.dumps(content.to_dict(), indent=2) + "\n", "utf-8")
-    written = [document]
+    written = [documents.write(directory / "content.json", content.to_dict())]
     if content.surface is not None:
         written.append(write_map(directory / "surface.csv", content.surface))
     return written + [save(made, directory / f"{name}.png") for name, made in pictures(content).items()]

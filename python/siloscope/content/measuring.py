@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from siloscope import _core, sensors
 from siloscope.calibrate import calibrate
@@ -107,10 +107,9 @@ def measure(
     prepared = prepare(data, _camera(data, camera, located), profile or sensors.UNKNOWN,
                        depth_unit=depth_unit, mask=mask)  # fmt: skip
     ready = time.perf_counter()
-    found, surface = _run(prepared, known, sheet)
     if known.lengths.cone_only:
-        known = _closer(known, located, found, surface)
-        found, surface = _run(prepared, known, sheet)
+        known = _closer(prepared, known, sheet, located)
+    found, surface = _run(prepared, known, sheet)
     done = time.perf_counter()
     request = Request(data, known, sheet, table, chosen, previous, calibration is None)
     times = {"prepare": 1e3 * (ready - start), "measure": 1e3 * (done - ready)}
@@ -154,31 +153,49 @@ def _camera(data: Frame | ArrayLike, camera: Camera | None, calibration: Calibra
         raise InputError("the calibration's camera is damaged; give --camera FILE") from None
 
 
-def _run(prepared: Prepared, known: Knowledge, sheet: Datasheet) -> tuple[dict[str, Any], _core.ContentSurface | None]:
-    """The core's answer."""
-    pose = (known.pose.r_x, known.pose.r_y, known.pose.t_x, known.pose.t_y)
+def _inputs(
+    prepared: Prepared, known: Knowledge, sheet: Datasheet
+) -> tuple[NDArray[np.float32], Camera | None, NDArray[np.float64] | None, _core.ContentSetup]:
+    """What the core takes."""
     depth = prepared.depth
     if depth is None and prepared.points is not None:
         depth = np.ascontiguousarray(prepared.points, np.float32)
     assert depth is not None
-    silo = lengths_for_core(known, sheet)
     camera = prepared.camera
     rays = None if camera is None or camera.distortion_model == "none" else camera.rays()
+    setup = _core.ContentSetup(
+        (known.pose.r_x, known.pose.r_y, known.pose.t_x, known.pose.t_y), lengths_for_core(known, sheet),
+        known.covariance, WALL_STD, known.bias, known.noise, known.noise_known, known.range,
+    )  # fmt: skip
+    return depth, camera, rays, setup
+
+
+def _run(prepared: Prepared, known: Knowledge, sheet: Datasheet) -> tuple[dict[str, Any], _core.ContentSurface | None]:
+    """The core's answer."""
     try:
-        return _core.content_measure(
-            depth, camera, rays, pose, silo, known.covariance, WALL_STD, known.bias, known.noise,
-            known.noise_known, known.range,
-        )  # fmt: skip
+        return _core.content_measure(*_inputs(prepared, known, sheet))
     except ValueError as error:
         raise UsageError(str(error)) from None
 
 
-def _closer(
-    known: Knowledge, calibration: Calibration, found: dict[str, Any], core: _core.ContentSurface | None
-) -> Knowledge:
+def _closer(prepared: Prepared, known: Knowledge, sheet: Datasheet, calibration: Calibration) -> Knowledge:
     """A cone of which nobody knows where it ends, cut off behind the farthest bare wall, so that the map fits it."""
     radius = known.lengths.geometry.radius
-    if found["bare"] is None or core is None or radius is None:
+    try:
+        bare = _core.content_bare_reach(*_inputs(_every_other(prepared), known, sheet))
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    if bare is None or radius is None:
         return known
-    _, reach, side = core.grid
-    return narrowed(known, calibration, min(found["bare"][1] + BEHIND * 2.0 * reach / side, radius))
+    farthest, cell = bare
+    return narrowed(known, calibration, min(farthest + BEHIND * cell, radius))
+
+
+def _every_other(prepared: Prepared) -> Prepared:
+    """Every other row and column of a depth image: enough to see how far the bare wall reaches."""
+    depth, camera = prepared.depth, prepared.camera
+    if depth is None or camera is None:
+        return prepared
+    few = np.ascontiguousarray(depth[::2, ::2])
+    (height, width), halves = few.shape, {name: getattr(camera, name) / 2 for name in ("fx", "fy", "cx", "cy")}
+    return replace(prepared, depth=few, camera=replace(camera, width=width, height=height, **halves))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
@@ -10,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from siloscope import documents
 from siloscope.report import Report, picture, table, text
 from siloscope.tracking.story import ABSOLUTE, DAY, Event, Reading, Track, utc
 from siloscope.tracking.tables import write_csv, write_jsonl, write_parquet
@@ -29,8 +29,7 @@ def write_track(directory: Path, found: Track, parquet: bool = False) -> list[Pa
     from siloscope.plots import save
 
     directory.mkdir(parents=True, exist_ok=True)
-    document = directory / "track.json"
-    document.write_text(json.dumps(found.to_dict(), indent=2) + "\n", "utf-8")
+    document = documents.write(directory / "track.json", found.to_dict())
     written = [document, write_csv(directory / "readings.csv", found), write_jsonl(directory / "readings.jsonl", found)]
     if parquet:
         written.append(write_parquet(directory / "readings.parquet", found))

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import csv
-import json
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from siloscope import documents
 from siloscope.errors import UsageError
 from siloscope.tracking.story import Track
 
@@ -29,7 +29,7 @@ def write_csv(path: Path, found: Track) -> Path:
 
 def write_jsonl(path: Path, found: Track) -> Path:
     """One JSON document a line and reading."""
-    lines = (json.dumps(reading.to_dict(), allow_nan=False) for reading in found.readings)
+    lines = (documents.text(reading.to_dict()) for reading in found.readings)
     path.write_text("".join(f"{line}\n" for line in lines), "utf-8")
     return path
 

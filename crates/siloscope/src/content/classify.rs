@@ -63,6 +63,26 @@ impl Floor<'_> {
         let noise = cell.variance + self.wall_std * self.wall_std;
         thickness / (known * known + noise).sqrt()
     }
+
+    /// The same of every cell, 0 for those that were not seen.
+    fn all_above(&self, cells: &[Cell], grid: &Grid) -> Vec<f64> {
+        cells.iter().map(|c| if c.seen() { self.sigmas_above(c, grid) } else { 0.0 }).collect()
+    }
+
+    /// Distances from the axis of the nearest and the farthest cell that shows the bare floor.
+    pub fn bare(&self, cells: &[Cell], grid: &Grid) -> Option<[f64; 2]> {
+        let above = self.all_above(cells, grid);
+        let bare = (0..cells.len()).filter(|&i| cells[i].seen() && above[i] <= SIGMAS);
+        extent(grid, bare)
+    }
+}
+
+/// Distances from the axis of the nearest and the farthest of some cells.
+pub fn extent(grid: &Grid, cells: impl Iterator<Item = usize>) -> Option<[f64; 2]> {
+    cells.map(|i| grid.middle(i)).map(|[x, y]| x.hypot(y)).fold(None, |found, r| match found {
+        None => Some([r, r]),
+        Some([near, far]) => Some([f64::min(near, r), f64::max(far, r)]),
+    })
 }
 
 /// Mean distance from the axis over a square cell: `√(r² + c s²)` with the square's variance s².
@@ -75,8 +95,7 @@ fn mean_radius([x, y, _]: [f64; 3], cell: f64) -> f64 {
 
 /// Sorts the cells and fits the surface.
 pub fn classify(grid: &Grid, cells: &[Cell], floor: &Floor<'_>) -> Classified {
-    let sigmas = |c: &Cell| if c.seen() { floor.sigmas_above(c, grid) } else { 0.0 };
-    let above: Vec<f64> = cells.iter().map(sigmas).collect();
+    let above = floor.all_above(cells, grid);
     let covered: Vec<bool> = above.iter().map(|&sigmas| sigmas > SIGMAS).collect();
     let main = main_part(grid, cells, &covered);
     let (mut things, mut holes) = (Vec::new(), Vec::new());

@@ -2,7 +2,7 @@
 
 use super::bound::Bound;
 use super::cells::{Tally, gather};
-use super::classify::{Classified, Floor, Thing, classify};
+use super::classify::{Classified, Floor, Thing, classify, extent};
 use super::doubt::{Covariance, DEPTH, GEOMETRY, Lever, POSE, Parameters, deviation, share};
 use super::drift::settle;
 use super::fit::{Surface, WIDER};
@@ -97,17 +97,10 @@ pub struct Content {
 
 /// Measures the content.
 pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
-    setup.vessel.validate()?;
-    let returns = Returns::new(source, setup.bias, &setup.pose, setup.vessel.ovality)?;
-    let grid = Grid::over_disc([0.0, 0.0], setup.vessel.radius, returns.len());
-    let lever = Lever::new(&setup.pose, setup.bias);
-    let bound = bound(setup);
-    let (mut cells, tally) = gather(&returns, &bound, &grid, &setup.noise, &lever);
-    if setup.noise_known {
-        settle(&mut cells, &grid, &bound, &setup.noise, &lever);
-    }
-    let floor = Floor { vessel: &setup.vessel, lever: &lever, covariance: &setup.covariance, wall_std: setup.wall_std };
-    let Classified { kinds, surface, things, holes, sunken } = classify(&grid, &cells, &floor);
+    let seen = Seen::new(source, setup)?;
+    let floor = seen.floor(setup);
+    let Classified { kinds, surface, things, holes, sunken } = classify(&seen.grid, &seen.cells, &floor);
+    let Seen { returns, grid, lever, cells, tally } = seen;
     let volume = surface.as_ref().map(|s| integrate(s, &setup.vessel, &kinds));
     let (doubts, derivatives) = match (&surface, &volume) {
         (Some(surface), Some(volume)) => doubts(surface, volume, &cells, &lever, setup),
@@ -116,7 +109,7 @@ pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
     let shape = surface.as_ref().and_then(|s| shape_of(s, &cells, setup.vessel.radius));
     let sight = sight(source, &returns, &setup.vessel, &setup.pose, setup.range);
     let shift = shift(&returns, &setup.vessel, &lever, &setup.noise, &setup.covariance, surface.as_ref());
-    let bare = bare_floor(&grid, &kinds);
+    let bare = extent(&grid, (0..grid.count()).filter(|&i| matches!(kinds[i], Kind::Bare | Kind::Rim)));
     Ok(Content {
         grid,
         cells,
@@ -136,6 +129,41 @@ pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
     })
 }
 
+/// Distance from the axis of the farthest bare wall that a frame shows, and the size of the cells that tell.
+pub fn bare_reach(source: Source<'_>, setup: &Setup) -> Result<Option<[f64; 2]>> {
+    let seen = Seen::new(source, setup)?;
+    let bare = seen.floor(setup).bare(&seen.cells, &seen.grid);
+    Ok(bare.map(|[_, far]| [far, seen.grid.cell()]))
+}
+
+/// What the returns say over each cell.
+struct Seen<'a> {
+    returns: Returns<'a>,
+    grid: Grid,
+    lever: Lever,
+    cells: Vec<Cell>,
+    tally: Tally,
+}
+
+impl<'a> Seen<'a> {
+    fn new(source: Source<'a>, setup: &Setup) -> Result<Self> {
+        setup.vessel.validate()?;
+        let returns = Returns::new(source, setup.bias, &setup.pose, setup.vessel.ovality)?;
+        let grid = Grid::over_disc([0.0, 0.0], setup.vessel.radius, returns.len());
+        let lever = Lever::new(&setup.pose, setup.bias);
+        let bound = bound(setup);
+        let (mut cells, tally) = gather(&returns, &bound, &grid, &setup.noise, &lever);
+        if setup.noise_known {
+            settle(&mut cells, &grid, &bound, &setup.noise, &lever);
+        }
+        Ok(Self { returns, grid, lever, cells, tally })
+    }
+
+    fn floor<'b>(&'b self, setup: &'b Setup) -> Floor<'b> {
+        Floor { vessel: &setup.vessel, lever: &self.lever, covariance: &setup.covariance, wall_std: setup.wall_std }
+    }
+}
+
 /// Shape of the seen part of a surface; heights upwards.
 pub fn shape_of(surface: &Surface, cells: &[Cell], reach: f64) -> Option<Shape> {
     let sample = |((i, o), [zx, zy]): (&(usize, Observation), &[f64; 2])| {
@@ -146,14 +174,6 @@ pub fn shape_of(surface: &Surface, cells: &[Cell], reach: f64) -> Option<Shape> 
     };
     let samples: Vec<Sample> = surface.used.iter().zip(&surface.slopes).map(sample).collect();
     shape(&samples, surface.grid.centre, reach)
-}
-
-fn bare_floor(grid: &Grid, kinds: &[Kind]) -> Option<[f64; 2]> {
-    let bare = (0..grid.count()).filter(|&i| matches!(kinds[i], Kind::Bare | Kind::Rim));
-    bare.map(|i| grid.middle(i)).map(|[x, y]| x.hypot(y)).fold(None, |found, r| match found {
-        None => Some([r, r]),
-        Some([near, far]) => Some([f64::min(near, r), f64::max(far, r)]),
-    })
 }
 
 /// The cylinder with the variance of a point's distance to it.
