@@ -110,6 +110,18 @@ def test_a_narrow_view_of_an_oval_silo_is_covered_by_the_stated_deviation() -> N
     assert np.all(np.abs(error) < 3.0 * np.sqrt(found.covariance.diagonal()))
 
 
+@pytest.mark.parametrize(("seed", "shape", "level"), [(7116, "funnel", 0.1404), (7140, "gaussian", 0.2115)])
+def test_corrugation_is_covered_by_the_stated_deviation_with_the_noise_unknown(
+    seed: int, shape: str, level: float
+) -> None:
+    scene = in_use(seed, shape, level, "corrugated")
+    found = fit(scene, None)
+    assert found.pose is not None, found.message
+    assert found.covariance is not None
+    error = np.array([getattr(found.pose, k) - getattr(scene.pose, k) for k in ("r_x", "r_y", "t_x", "t_y")])
+    assert np.all(np.abs(error) < 3.0 * np.sqrt(found.covariance.diagonal()))
+
+
 @pytest.mark.parametrize("level", [0.05, 0.2, 0.35])
 def test_a_farms_silo_is_found_with_nothing_known_of_its_sensor(level: float) -> None:
     silo = real_silo("silo-r2", 12)

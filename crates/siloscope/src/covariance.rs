@@ -3,6 +3,7 @@
 use crate::polish::TileEquation;
 use crate::refine::{Equation, Fit, Problem, System, tukey};
 use crate::surface::{Information, OVALITY, PARAMETERS, Parameters};
+use nalgebra::{Matrix4, Vector4};
 
 /// The model's covariance, widened in those directions in which groups of tiles disagree more than it says.
 ///
@@ -126,6 +127,28 @@ pub fn relief(tiles: &[TileEquation]) -> f64 {
     }
     let (excess, error) = (sum / weights, weights.powf(-0.5));
     if excess > 5.0 * error + RESOLUTION * RESOLUTION { excess.sqrt() } else { 0.0 }
+}
+
+/// The same where the noise itself has to be told from the scatter: relief grows with the incidence, noise with the depth.
+///
+/// Least squares of the tiles' variances on 1, d² and d⁴ for the noise and 1/cos² for the relief. Where depth and incidence
+/// go together they can't be told apart, and the relief is 0.
+pub fn relief_beside_noise(tiles: &[TileEquation]) -> f64 {
+    let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
+    let rows = tiles.iter().map(|TileEquation { equation: e, noise, scatter, count, .. }| {
+        let (d2, expected) = (e.jacobian[8] * e.jacobian[8], noise * count);
+        let weight = count / (2.0 * expected * expected).max(1e-24); // of an estimated variance
+        (Vector4::new(1.0, d2, d2 * d2, 1.0 / (e.cosine * e.cosine)), scatter * scatter, weight)
+    });
+    for (row, variance, weight) in rows.clone() {
+        normal += row * row.transpose() * weight;
+        right += row * (variance * weight);
+    }
+    let Some(inverse) = normal.try_inverse() else { return 0.0 };
+    let law = inverse * right;
+    let misfit: f64 = rows.map(|(row, variance, weight)| weight * (variance - row.dot(&law)).powi(2)).sum();
+    let error = (inverse[(3, 3)] * (misfit / tiles.len() as f64).max(1.0)).sqrt();
+    if law[3] > 5.0 * error + RESOLUTION * RESOLUTION { law[3].sqrt() } else { 0.0 }
 }
 
 /// Relief that rounding of raw depths feigns, metres.

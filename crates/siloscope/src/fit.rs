@@ -4,7 +4,7 @@ use crate::Result;
 use crate::Vec3;
 use crate::cloud::cloud_patches;
 use crate::coarse::{Settled, coarse_fit, drop_bare_parts};
-use crate::covariance::{relief, relief_uncertainty, scale_uncertainty, shows_ovality, widened};
+use crate::covariance::{relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened};
 use crate::known_wall::{KnownWall, confirmed};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
@@ -279,7 +279,7 @@ fn finish(
     let joint = if problem.patches.cloud { system } else { system.with_ovality(OVALITY_STD) };
     let (model, jointly_free) = joint.covariance(&fit).ok_or(Refusal::PoorlyDetermined)?;
     let mut covariance = widened(problem, &model, &joint, (tiles, &pulls));
-    let relief = if noise_is_known { relief(tiles) } else { 0.0 };
+    let relief = if noise_is_known { relief(tiles) } else { relief_beside_noise(tiles) };
     covariance += relief_uncertainty(&joint, &fit, tiles, (relief, form(&fit, free[OVALITY])));
     let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
