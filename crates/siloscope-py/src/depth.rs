@@ -8,13 +8,13 @@ use pyo3::prelude::*;
 const SENTINEL: u16 = u16::MAX;
 
 /// Depth (H, W) of uint16, float32 or float64 times `unit` as float32 metres, C-contiguous, 0 where there is no
-/// measurement; and how many pixels have one.
+/// measurement; and whether any pixel has one.
 #[pyfunction]
 fn depth_metres<'py>(
     py: Python<'py>,
     depth: &Bound<'py, PyAny>,
     unit: f64,
-) -> PyResult<(Bound<'py, PyArray2<f32>>, usize)> {
+) -> PyResult<(Bound<'py, PyArray2<f32>>, bool)> {
     let unit = unit as f32;
     if let Ok(raw) = depth.extract::<PyReadonlyArray2<'py, u16>>() {
         return converted(py, &raw, |&z| if z == SENTINEL { 0.0 } else { f32::from(z) * unit });
@@ -31,14 +31,14 @@ fn converted<'py, T: Element + Sync>(
     py: Python<'py>,
     depth: &PyReadonlyArray2<'py, T>,
     metres: impl Fn(&T) -> f32 + Sync,
-) -> PyResult<(Bound<'py, PyArray2<f32>>, usize)> {
+) -> PyResult<(Bound<'py, PyArray2<f32>>, bool)> {
     let shape = [depth.shape()[0], depth.shape()[1]];
     let array = depth.as_array();
     let values: Vec<f32> = match array.as_slice() {
         Some(slice) => py.detach(|| slice.iter().map(&metres).collect()),
         None => array.iter().map(&metres).collect(),
     };
-    let valid = values.chunks(1 << 20).map(|part| part.iter().map(|&z| u32::from(z > 0.0)).sum::<u32>() as usize).sum();
+    let valid = values.iter().any(|&z| z > 0.0);
     Ok((PyArray1::from_vec(py, values).reshape(shape)?, valid))
 }
 

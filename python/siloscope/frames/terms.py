@@ -119,7 +119,8 @@ def _with_raw_units(frame: Frame, given: float | None) -> Frame:
         raise UnknownUnit(f"{frame.source}: a depth unit of {unit} m is not possible; give --depth-unit in metres")
     depth = frame.depth
     assert depth is not None
-    if (median := _median(depth) * unit) > FARTHEST_M:
+    possible = depth.dtype != np.uint16 or 65_535 * unit > FARTHEST_M
+    if possible and (median := _median(depth) * unit) > FARTHEST_M:
         raise UnknownUnit(
             f"{frame.source}: a depth unit of {unit} m puts the median depth at {median:.4g} m; give --depth-unit in "
             "metres per raw unit, such as 0.001"
