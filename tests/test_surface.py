@@ -134,6 +134,14 @@ def test_a_farms_silo_is_found_with_nothing_known_of_its_sensor(level: float) ->
     assert gap(found, scene) < 30.0
 
 
+@pytest.mark.parametrize(("seed", "shape", "level"), [(7017, "mound", 0.1133), (7073, "gaussian+tilted", 0.1702)])
+def test_feed_stuck_above_the_cone_is_not_taken_for_the_cylinder(seed: int, shape: str, level: float) -> None:
+    scene = in_use(seed, shape, level, "film,oval,dents")
+    found = fit(scene, "orbbec-astra-s")
+    assert found.pose is not None, found.message
+    assert found.silo.radius is None or found.silo.radius == pytest.approx(scene.silo.radius, abs=0.005)
+
+
 def test_an_auger_in_view_is_no_silo_seen_from_outside() -> None:
     scene = in_use(1056, "funnel", 0.2966, "film,auger,dents,oval")
     assert fit(scene, "orbbec-astra-s").status == "refused"

@@ -281,6 +281,33 @@ pub fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
     }
 }
 
+/// Leaves out a cylinder that is the smaller part of what is seen and has wall behind it: feed that sticks above the cone.
+pub fn drop_film(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
+    const SKETCH: usize = 3;
+    const SURE: f64 = 5.0;
+    const FILM: f64 = 0.1; // thicker than any film, as a share of the silo's size
+    const SHARE: f64 = 0.2;
+    if problem.patches.cloud || !fit.inside || fit.surface.radius.is_none() || fit.surface.cone.is_none() {
+        return;
+    }
+    let (placed, reach) = (PlacedSurface::new(fit.surface), FILM * fit.surface.size());
+    let (mut cylinder, mut cone, mut behind) = (0, 0, 0);
+    for i in (0..wall.len()).step_by(SKETCH).filter(|&i| wall[i] || problem.patches.list[i].smooth) {
+        let Some(contact) = problem.contact(fit, &placed, i) else { continue };
+        let off = contact.residual * contact.cosine;
+        let surely = off > SURE * contact.variance.sqrt() * contact.cosine && off < reach;
+        match (contact.part, wall[i]) {
+            (Part::Cylinder, true) => cylinder += 1,
+            (Part::Cone, true) => cone += 1,
+            (Part::Cylinder, false) if surely => behind += 1,
+            _ => {}
+        }
+    }
+    if cylinder < cone && f64::from(behind) > SHARE * f64::from(cylinder) {
+        fit.surface.radius = None;
+    }
+}
+
 /// Patches that agree with the wall and whose neighbours do too: the seam with feed or clutter is left out.
 fn wall_patches(problem: &Problem, fit: &Fit) -> Vec<bool> {
     let placed = PlacedSurface::new(fit.surface);

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::Vec3;
 use crate::cloud::cloud_patches;
-use crate::coarse::{Settled, coarse_fit, drop_bare_parts};
+use crate::coarse::{Settled, coarse_fit, drop_bare_parts, drop_film};
 use crate::covariance::{relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened};
 use crate::known_wall::{KnownWall, confirmed};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
@@ -117,6 +117,7 @@ fn measured(
         fit.rescale_to(radius);
     }
     drop_bare_parts(&problem, &mut fit, &wall);
+    drop_film(&problem, &mut fit, &wall);
     known.drop_parts_without(&fit.surface);
     let (noise, mut equations) = on_pixels(problem, image, &mut fit, &wall, know.error.noise, looks);
     let round = Problem { noise, ..problem };
