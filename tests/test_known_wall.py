@@ -125,6 +125,14 @@ def test_an_oval_wall_stays_oval() -> None:
         assert led.extra["fit"]["ovality"] == pytest.approx(located(again).extra["fit"]["ovality"], rel=0.05)
 
 
+def test_a_rough_wall_is_searched_for_where_the_depths_bend_is_not_known() -> None:
+    rough = replace(WALL, defects=Defects(ovality=0.008, upright_seams=8, dents=5, bolts=20, seam_spacing=1.2))
+    first, again = located(rough, sensor=None), located(replace(rough, seed=22), sensor=None)
+    led = locate(frame(replace(rough, seed=22)), start=first)
+    assert is_searched(led)
+    assert led.pose == again.pose
+
+
 def test_a_start_that_tells_no_wall_is_no_start() -> None:
     refused = located(replace(scenario("flat-wall"), seed=5))
     for start in (refused, replace(located(WALL), details=None)):

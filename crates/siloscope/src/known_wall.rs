@@ -26,6 +26,8 @@ pub struct KnownWall {
 
 /// Least share of the patches that must be wall: a frame that shows less is searched for what else it may show.
 const LEAST_SHARE: f64 = 0.35;
+/// Most misfit where the depth's bend is fitted too, as a share of the silo's size: a rough wall and a bent depth trade.
+const MOST_MISFIT: f64 = 1e-3;
 /// How far the wall may be from the known one: radians, and lengths as shares of the silo's size.
 const SAME_TILT: f64 = 0.01;
 const SAME_PLACE: f64 = 0.03;
@@ -43,12 +45,14 @@ pub fn confirmed(
 ) -> Option<Settled> {
     let prior = &with_free_size(prior);
     let mut fit = known.fit(patches.list.len());
-    if prior.bias_std[2] > 0.0 {
+    let bends = prior.bias_std[2] > 0.0;
+    if bends {
         Problem { patches, noise, prior, pixel }.refine(&mut fit, 3, 4, 0.2);
         patches.unbias_normals(&fit.bias);
     }
     let found = settled(&Problem { patches, noise, prior, pixel }, fit).ok()?;
-    (found.evidence.share > LEAST_SHARE && known.is_same(&found.fit.surface)).then_some(found)
+    let rough = known.misfit.max(found.fit.misfit) > MOST_MISFIT * found.fit.surface.size();
+    (!(bends && rough) && found.evidence.share > LEAST_SHARE && known.is_same(&found.fit.surface)).then_some(found)
 }
 
 impl KnownWall {
