@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from siloscope import Estimate, SiloPose, sensors
+from siloscope import Camera, Estimate, SiloPose, sensors
 from siloscope.paper import metrics
 from siloscope.paper.scenarios import random_scene, scenario
 from siloscope.paper.stand_ins import IRREGULAR, real_silo
-from siloscope.scene import ASTRA_S, Feed, Scene, defects
+from siloscope.scene import ASTRA_S, Feed, Scene, Silo, defects
 from siloscope.sensors import SensorProfile
 from siloscope.surface import fit_depth, reasons
 
@@ -173,3 +173,14 @@ def test_a_gravity_prior_pulls_the_axis_by_its_weight() -> None:
     assert abs(free.pose.r_x - scene.pose.r_x) < 1e-4
     assert held.pose.r_x - scene.pose.r_x == pytest.approx(0.01, abs=1e-3)
     assert held.to_dict()["gravity"]["r_x"] == pytest.approx(scene.pose.r_x + 0.01, abs=1e-9)
+
+
+def test_a_tilted_lumpy_funnel_of_feed_is_not_taken_for_the_cone() -> None:
+    silo = Silo(1.6647, 5.7223, 1.8844, top=-0.1622)
+    camera = Camera(width=640, height=480, fx=534.168, fy=532.621, cx=319.211, cy=247.076)
+    pose = SiloPose(-0.06874, -0.08974, 1.036, -0.27126)
+    feed, wall = Feed("funnel+lumpy+tilted", 0.3892, seed=3077), defects("dents,ladder", 3077)
+    scene = Scene(silo, pose, camera, feed, ASTRA_S, seed=3077, defects=wall)
+    found = fit(scene, "orbbec-astra-s")
+    assert found.pose is not None, found.message
+    assert found.silo.apex is None or found.silo.apex == pytest.approx(silo.geometry.apex, abs=0.05)

@@ -155,19 +155,23 @@ fn without_feed(problem: &Problem, fit: Fit) -> Result<Fit, Refusal> {
 /// Whether feed lies well before the cone at its vertex and all around it: then the cone is no surface of feed itself.
 ///
 /// A funnel of feed also has a rounded tip, which lies a little before its own cone. And an auger may stand over it: that
-/// covers the tip, but to its sides more of the cone than elsewhere.
+/// covers the tip, but to its sides more of the cone than elsewhere. And lumps of feed may cover the tip of a funnel that
+/// was found in the rest of it: they leave no rim free.
 fn apex_is_covered(problem: &Problem, fit: &Fit) -> bool {
     const SECTORS: usize = 4;
     const EVEN: f64 = 0.5;
-    let tip = before_the_cone(problem, fit, 0.06);
-    let disc = before_the_cone(problem, fit, 0.3);
+    const FREE: f64 = 0.3;
+    let tip = before_the_cone(problem, fit, 0.0..0.06);
+    let disc = before_the_cone(problem, fit, 0.0..0.3);
+    let rim = before_the_cone(problem, fit, 0.7..f64::INFINITY);
     let share = |sector: usize| {
         let of_sector = disc.iter().filter(|(azimuth, _)| sector_of(*azimuth, SECTORS) == sector);
         share_above(of_sector, 0.01)
     };
     let shares: [f64; SECTORS] = std::array::from_fn(share);
     let (least, most) = (shares.iter().copied().fold(1.0, f64::min), shares.iter().copied().fold(0.0, f64::max));
-    tip.len() >= 4 && share_above(tip.iter(), 0.08) >= 0.7 && least > EVEN * most
+    let covered = tip.len() >= 4 && share_above(tip.iter(), 0.08) >= 0.7 && least > EVEN * most;
+    covered && share_above(rim.iter(), 0.01) < FREE
 }
 
 fn sector_of(azimuth: f64, sectors: usize) -> usize {
@@ -180,9 +184,9 @@ fn share_above<'a>(places: impl Iterator<Item = &'a (f64, f64)>, bar: f64) -> f6
     f64::from(above) / f64::from(count.max(1))
 }
 
-/// Azimuth of the patches within `reach` of the axis, and how far they surely lie before the cone. Lengths are shares of
+/// Azimuth of the patches at distances in `reach` from the axis, and how far they surely lie before the cone. Lengths are shares of
 /// the silo's size.
-fn before_the_cone(problem: &Problem, fit: &Fit, reach: f64) -> Vec<(f64, f64)> {
+fn before_the_cone(problem: &Problem, fit: &Fit, reach: std::ops::Range<f64>) -> Vec<(f64, f64)> {
     if problem.patches.cloud {
         return Vec::new();
     }
@@ -191,7 +195,7 @@ fn before_the_cone(problem: &Problem, fit: &Fit, reach: f64) -> Vec<(f64, f64)> 
         let (d, part) = placed.depth(&patch.q);
         let p = placed.to_silo(&(patch.q * d));
         let sure = d - fit.bias.true_depth(patch.measured) - 4.0 * problem.noise.sigma(d) / patch.count.sqrt();
-        (part == Part::Cone && p.x.hypot(p.y) < reach * size).then(|| (p.y.atan2(p.x), sure / size))
+        (part == Part::Cone && reach.contains(&(p.x.hypot(p.y) / size))).then(|| (p.y.atan2(p.x), sure / size))
     };
     problem.patches.list.iter().filter_map(before).collect()
 }
