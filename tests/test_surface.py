@@ -11,7 +11,7 @@ from siloscope import Camera, Estimate, SiloPose, sensors
 from siloscope.paper import metrics
 from siloscope.paper.scenarios import random_scene, scenario
 from siloscope.paper.stand_ins import IRREGULAR, real_silo
-from siloscope.scene import ASTRA_S, Feed, Scene, Silo, defects
+from siloscope.scene import ASTRA_S, Feed, Scene, SensorModel, Silo, defects
 from siloscope.sensors import SensorProfile
 from siloscope.surface import fit_depth, reasons
 
@@ -76,6 +76,27 @@ def test_a_funnel_of_feed_about_the_axis_is_not_taken_for_the_cone() -> None:
     truth = scene.silo.geometry
     assert estimate.silo.apex == pytest.approx(truth.apex, abs=0.01)  # feed lies at 65°, this cone at 30°
     assert estimate.silo.radius == pytest.approx(truth.radius, abs=0.002)
+
+
+def test_a_small_piece_of_the_cone_is_not_taken_for_a_cylinder() -> None:
+    scene = random_scene(3025, Feed("gaussian", 0.48983, seed=3025), sensor=ASTRA_S)
+    estimate = fit(scene, "orbbec-astra-s")
+    assert gap(estimate, scene) < 10.0  # a cylinder about another axis agrees with half of that wall: 540
+    assert estimate.silo.radius is None
+    assert estimate.silo.apex == pytest.approx(scene.silo.geometry.apex, abs=0.03)
+
+
+def test_feed_and_wall_are_not_taken_for_one_cone() -> None:
+    scene = in_use(1086, "funnel", 0.28722, "seams,dents,oval,ladder,cables")
+    assert gap(fit(scene, "orbbec-astra-s"), scene) < 3.0
+
+
+def test_noise_that_neighbouring_pixels_share_hides_no_wall() -> None:
+    noisy = SensorModel(noise=(0.0, 0.0, 0.0038), noise_floor=5e-4, correlation=0.5)  # as stereo has it
+    scenes = [random_scene(seed, Feed("gaussian", 0.2), sensor=noisy) for seed in range(3000, 3008)]
+    found = [fit(scene, "realsense-d435") for scene in scenes]
+    assert sum(f.ok for f in found) >= 7
+    assert max(gap(f, s) for f, s in zip(found, scenes, strict=True) if f.ok) < 30.0
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -1,12 +1,14 @@
 //! From start values to a fit on patches that stands up to the evidence.
 
-use crate::patches::{NONE, Patch, Patches};
+use crate::patches::{NONE, Patches};
 use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, NoiseLaw};
 use crate::start::{Oriented, Start, View, other_part, starts, steeper_cone};
 use crate::surface::{Part, PlacedSurface};
+use crate::taper::cone_instead;
 use crate::verdict::{WallEvidence, wall_evidence};
+use crate::vertex::is_covered;
 
 /// A cone that rises less than 37.4° could as well be feed, unless feed lies in it: angles of repose go up to 36°, and
 /// a fit to feed with some wall in it may come out a little steeper.
@@ -122,15 +124,19 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
     if may_be_feed(problem, &fit) {
         fit = without_feed(problem, fit)?;
     }
-    let wall = wall_patches(problem, &fit);
+    let mut wall = wall_patches(problem, &fit);
+    if let Some(cone) = cone_instead(problem, &fit, &wall) {
+        wall = wall_patches(problem, &cone);
+        fit = cone;
+    }
     let evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
     judge(&evidence, fit.inside, problem.patches.cloud)?;
     Ok(Settled { fit, wall, evidence })
 }
 
 /// Whether the cone could as well be feed.
-fn may_be_feed(problem: &Problem, fit: &Fit) -> bool {
-    fit.surface.cone.is_some_and(|c| c.slope > FEED_SLOPE) && !apex_is_covered(problem, fit)
+pub(crate) fn may_be_feed(problem: &Problem, fit: &Fit) -> bool {
+    fit.surface.cone.is_some_and(|c| c.slope > FEED_SLOPE) && !is_covered(problem, fit)
 }
 
 /// The fit with a steeper cone about the same axis in place of one that may be feed, or else without a cone.
@@ -150,54 +156,6 @@ fn without_feed(problem: &Problem, fit: Fit) -> Result<Fit, Refusal> {
     alone.surface.cone = None;
     problem.refine(&mut alone, 3, 2, 0.15);
     Ok(alone)
-}
-
-/// Whether feed lies well before the cone at its vertex and all around it: then the cone is no surface of feed itself.
-///
-/// A funnel of feed also has a rounded tip, which lies a little before its own cone. And an auger may stand over it: that
-/// covers the tip, but to its sides more of the cone than elsewhere. And lumps of feed may cover the tip of a funnel that
-/// was found in the rest of it: they leave no rim free.
-fn apex_is_covered(problem: &Problem, fit: &Fit) -> bool {
-    const SECTORS: usize = 4;
-    const EVEN: f64 = 0.5;
-    const FREE: f64 = 0.3;
-    let tip = before_the_cone(problem, fit, 0.0..0.06);
-    let disc = before_the_cone(problem, fit, 0.0..0.3);
-    let rim = before_the_cone(problem, fit, 0.7..f64::INFINITY);
-    let share = |sector: usize| {
-        let of_sector = disc.iter().filter(|(azimuth, _)| sector_of(*azimuth, SECTORS) == sector);
-        share_above(of_sector, 0.01)
-    };
-    let shares: [f64; SECTORS] = std::array::from_fn(share);
-    let (least, most) = (shares.iter().copied().fold(1.0, f64::min), shares.iter().copied().fold(0.0, f64::max));
-    let covered = tip.len() >= 4 && share_above(tip.iter(), 0.08) >= 0.7 && least > EVEN * most;
-    covered && share_above(rim.iter(), 0.01) < FREE
-}
-
-fn sector_of(azimuth: f64, sectors: usize) -> usize {
-    let turn = azimuth / std::f64::consts::TAU + 0.5;
-    ((turn * sectors as f64) as usize).min(sectors - 1)
-}
-
-fn share_above<'a>(places: impl Iterator<Item = &'a (f64, f64)>, bar: f64) -> f64 {
-    let (count, above) = places.fold((0, 0), |(n, above), (_, before)| (n + 1, above + i32::from(*before > bar)));
-    f64::from(above) / f64::from(count.max(1))
-}
-
-/// Azimuth of the patches at distances in `reach` from the axis, and how far they surely lie before the cone. Lengths are shares of
-/// the silo's size.
-fn before_the_cone(problem: &Problem, fit: &Fit, reach: std::ops::Range<f64>) -> Vec<(f64, f64)> {
-    if problem.patches.cloud {
-        return Vec::new();
-    }
-    let (placed, size) = (PlacedSurface::new(fit.surface), fit.surface.size());
-    let before = |patch: &Patch| {
-        let (d, part) = placed.depth(&patch.q);
-        let p = placed.to_silo(&(patch.q * d));
-        let sure = d - fit.bias.true_depth(patch.measured) - 4.0 * problem.noise.sigma(d) / patch.count.sqrt();
-        (part == Part::Cone && reach.contains(&(p.x.hypot(p.y) / size))).then(|| (p.y.atan2(p.x), sure / size))
-    };
-    problem.patches.list.iter().filter_map(before).collect()
 }
 
 /// Least share of an image that a body fills that is looked at from outside.
@@ -258,7 +216,7 @@ fn oriented(problem: &Problem, bias: &DepthBias) -> Vec<Oriented> {
 }
 
 /// Log-likelihood gain of calling patches wall instead of anything else.
-fn likelihood(problem: &Problem, fit: &Fit) -> f64 {
+pub(crate) fn likelihood(problem: &Problem, fit: &Fit) -> f64 {
     let placed = PlacedSurface::new(fit.surface);
     let gain = |(i, &weight): (usize, &f64)| {
         let contact = if weight > 0.0 { problem.contact(fit, &placed, i) } else { None };

@@ -1,5 +1,6 @@
 //! How sure the fit is: the noise's covariance, widened by what the residuals say about the model, and the scale.
 
+use crate::patches::{DEEPEST, DOWN, NONE, RIGHT};
 use crate::polish::TileEquation;
 use crate::refine::{Equation, Fit, Problem, System, tukey};
 use crate::surface::{Information, OVALITY, PARAMETERS, Parameters};
@@ -95,6 +96,34 @@ pub fn relief_uncertainty(
         .map_or(Information::zeros(), |(spread, _)| spread + spread * pull * (spread * pull).transpose())
 }
 
+/// How much of the misfit is the wall's, metres across it.
+///
+/// All of it where neighbouring pixels' noise is independent, or where neighbouring tiles have most of the misfit in
+/// common, as with dents and stuck feed; else what they have in common, as the rest is the sensor's.
+pub fn lasting_misfit(problem: &Problem, misfit: f64, tiles: &[TileEquation]) -> f64 {
+    const MOST: f64 = 0.5;
+    if problem.patches.cloud || problem.patches.common_noise == 1.0 {
+        return misfit;
+    }
+    let mut off = vec![0.0; problem.patches.list.len()];
+    for TileEquation { patch, equation: e, .. } in tiles {
+        off[*patch] = e.residual * e.cosine * tukey(e.residual * e.residual / e.variance);
+    }
+    let beside = |i: usize, direction: usize| match problem.patches.neighbours[i][direction] {
+        NONE => None,
+        j => Some(j as usize),
+    };
+    let (mut product, mut pairs) = (0.0, 0.0); // of tiles two apart
+    for i in tiles.iter().map(|t| t.patch) {
+        for j in [RIGHT, DOWN].into_iter().filter_map(|to| beside(beside(i, to)?, to)).filter(|&j| off[j] != 0.0) {
+            product += off[i] * off[j];
+            pairs += 1.0;
+        }
+    }
+    let common = f64::max(product / f64::max(pairs, 1.0), 0.0).sqrt();
+    if common > MOST * misfit { misfit } else { common }
+}
+
 /// Whether the residuals show that the silo is oval: the two parts of its ovality against their covariance.
 pub fn shows_ovality(problem: &Problem, fit: &Fit, tiles: &mut [TileEquation], std: f64) -> bool {
     let mut system = System::with_prior(problem.prior, fit).with_ovality(std);
@@ -126,7 +155,7 @@ pub fn relief(tiles: &[TileEquation]) -> f64 {
         sum += weight * (scatter * scatter * across - noise);
     }
     let (excess, error) = (sum / weights, weights.powf(-0.5));
-    if excess > 5.0 * error + RESOLUTION * RESOLUTION { excess.sqrt() } else { 0.0 }
+    if excess > 5.0 * error + RESOLUTION * RESOLUTION { excess.sqrt().min(DEEPEST) } else { 0.0 }
 }
 
 /// The same where the noise itself has to be told from the scatter: relief grows with the incidence, noise with the depth.
@@ -148,7 +177,7 @@ pub fn relief_beside_noise(tiles: &[TileEquation]) -> f64 {
     let law = inverse * right;
     let misfit: f64 = rows.map(|(row, variance, weight)| weight * (variance - row.dot(&law)).powi(2)).sum();
     let error = (inverse[(3, 3)] * (misfit / tiles.len() as f64).max(1.0)).sqrt();
-    if law[3] > 5.0 * error + RESOLUTION * RESOLUTION { law[3].sqrt() } else { 0.0 }
+    if law[3] > 5.0 * error + RESOLUTION * RESOLUTION { law[3].sqrt().min(DEEPEST) } else { 0.0 }
 }
 
 /// Relief that rounding of raw depths feigns, metres.

@@ -3,8 +3,10 @@
 use crate::Result;
 use crate::Vec3;
 use crate::cloud::cloud_patches;
-use crate::coarse::{Settled, coarse_fit, drop_bare_parts, drop_film};
-use crate::covariance::{relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened};
+use crate::coarse::{Settled, coarse_fit, drop_bare_parts, drop_film, may_be_feed};
+use crate::covariance::{
+    lasting_misfit, relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened,
+};
 use crate::known_wall::{KnownWall, confirmed};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
@@ -66,8 +68,8 @@ const MISFIT_FORM: f64 = 2.0;
 const CHANCE_MISFIT: f64 = 2e-4;
 
 /// How far the wall may lie off its mean over a block of tiles, metres.
-fn form(fit: &Fit, oval: bool) -> f64 {
-    MISFIT_FORM * (fit.misfit - CHANCE_MISFIT).max(0.0) + if oval { WALL_FORM } else { 0.0 }
+fn form(misfit: f64, oval: bool) -> f64 {
+    MISFIT_FORM * (misfit - CHANCE_MISFIT).max(0.0) + if oval { WALL_FORM } else { 0.0 }
 }
 
 /// Fits the wall to a depth image; where another frame of the camera has shown a wall, it is looked for there first.
@@ -121,6 +123,13 @@ fn measured(
     known.drop_parts_without(&fit.surface);
     let (noise, mut equations) = on_pixels(problem, image, &mut fit, &wall, know.error.noise, looks);
     let round = Problem { noise, ..problem };
+    if may_be_feed(&round, &fit) {
+        // on its pixels the cone is less steep than on patches
+        fit.surface.radius.ok_or(Refusal::ConeMayBeFeed)?;
+        fit.surface.cone = None;
+        known.drop_parts_without(&fit.surface);
+        (_, equations) = on_pixels(round, image, &mut fit, &wall, Some(noise), Looks::Usual);
+    }
     known.oval = shows_ovality(&round, &fit, &mut equations, OVALITY_STD);
     if known.oval {
         prior.ovality_std = OVALITY_STD;
@@ -281,7 +290,8 @@ fn finish(
     let (model, jointly_free) = joint.covariance(&fit).ok_or(Refusal::PoorlyDetermined)?;
     let mut covariance = widened(problem, &model, &joint, (tiles, &pulls));
     let relief = if noise_is_known { relief(tiles) } else { relief_beside_noise(tiles) };
-    covariance += relief_uncertainty(&joint, &fit, tiles, (relief, form(&fit, free[OVALITY])));
+    let lasting = lasting_misfit(problem, fit.misfit, tiles);
+    covariance += relief_uncertainty(&joint, &fit, tiles, (relief, form(lasting, free[OVALITY])));
     let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
     check_determined(&covariance, &placed, heights / tiles.len().max(1) as f64)?;

@@ -38,7 +38,9 @@ pub mod shape_tensor;
 pub mod share;
 pub mod start;
 pub mod surface;
+pub mod taper;
 pub mod verdict;
+pub mod vertex;
 pub mod workers;
 
 pub use camera::{Camera, Distortion};
