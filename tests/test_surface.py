@@ -205,3 +205,12 @@ def test_a_tilted_lumpy_funnel_of_feed_is_not_taken_for_the_cone() -> None:
     found = fit(scene, "orbbec-astra-s")
     assert found.pose is not None, found.message
     assert found.silo.apex is None or found.silo.apex == pytest.approx(silo.geometry.apex, abs=0.05)
+
+
+def test_a_cone_of_which_little_is_seen_is_not_lost_on_the_way() -> None:
+    scene = random_scene(206, Feed("gaussian", 0.6), sensor=ASTRA_S)
+    scene = replace(scene, seed=1)
+    found = fit(scene, "orbbec-astra-s")
+    assert found.pose is not None, found.message
+    assert found.silo.apex == pytest.approx(scene.silo.geometry.apex, abs=0.1)
+    assert gap(found, scene) < 1.0

@@ -4,7 +4,7 @@ use crate::patches::{DepthImage, noise_from_scatter};
 use crate::pixels::{Sampling, tile_residual};
 use crate::refine::{Equation, Fit, Problem, System, tukey, tukey_slope};
 use crate::sensor::NoiseLaw;
-use crate::surface::{Parameters, PlacedSurface};
+use crate::surface::{Parameters, Part, PlacedSurface};
 
 /// The equation of one wall tile from its pixels.
 #[derive(Debug, Clone, Copy)]
@@ -140,7 +140,8 @@ pub fn solve_equations(
 ) -> Option<System> {
     let mut total = Parameters::zeros();
     let mut system = System::with_prior(problem.prior, fit);
-    equations.iter_mut().for_each(|e| e.allow(fit.misfit));
+    let start = misfit_to_start_from(fit, equations);
+    equations.iter_mut().for_each(|e| e.allow(start));
     for _ in 0..rounds {
         system = System::with_prior(problem.prior, fit);
         let (mut weights, mut slopes) = (0.0, 0.0);
@@ -183,6 +184,21 @@ impl TileEquation {
         let along = misfit / self.equation.cosine;
         self.equation.variance = self.noise + along * along;
     }
+}
+
+/// The misfit with which neither part of the wall is without weight: the step before may have gone too far for one that
+/// little is seen of, and what has no weight would never be fitted again.
+fn misfit_to_start_from(fit: &Fit, equations: &[TileEquation]) -> f64 {
+    const LOST: f64 = 0.1;
+    let needed = |part: Part| {
+        let of_part = || equations.iter().filter(|t| t.equation.part == part).copied();
+        let (count, weight) = of_part().fold((0.0, 0.0), |(count, weight), mut tile| {
+            tile.allow(fit.misfit);
+            (count + 1.0, weight + tukey(tile.equation.residual * tile.equation.residual / tile.equation.variance))
+        });
+        if weight < LOST * count { misfit_of(&of_part().collect::<Vec<_>>()) } else { 0.0 }
+    };
+    fit.misfit.max(needed(Part::Cylinder)).max(needed(Part::Cone))
 }
 
 /// How true a tile's mean is at best, metres: its pixels are held against a quadratic. A smaller misfit would take the
