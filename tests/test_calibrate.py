@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, calibrate, sensors
+from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, calibrate, locate, sensors
 from siloscope.cli import main
 from siloscope.paper.scenarios import scenario
 from siloscope.scene import ASTRA_S, Scene, discharge
@@ -372,6 +372,27 @@ def test_the_command_writes_the_calibration(folder: Path, tmp_path: Path, capsys
     again = tmp_path / "again.json"
     assert run(*sorted(folder.glob("*.png"))[-2:], *terms, "--continue", out, "-o", again, "--jobs", 1) == 0
     assert len(Calibration.load(again).frames) == 8
+
+
+def test_a_refusal_does_not_take_the_place_of_the_calibration_it_went_on_with(
+    folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    terms = ["--depth-unit", "0.0001", "--sensor", "orbbec-astra-s", "--camera", folder / "camera.json"]
+    out = tmp_path / "silo.json"
+    assert run(folder / "00.png", *terms, "-o", out) == 4
+    before = out.read_bytes()
+    assert run(folder / "00.png", *terms, "--continue", out, "-o", out) == 4
+    assert out.read_bytes() == before
+    assert "left as it was" in capsys.readouterr().err
+
+
+def test_estimates_bring_the_sensor_that_they_were_made_with(tmp_path: Path) -> None:
+    answers = [locate(scene.render().frame(), sensor="orbbec-astra-s") for scene in discharge(SILO3, 2, 0.3, 0.1)]
+    found = calibrate(answers)
+    assert found.config["sensor"]["name"] == "Orbbec Astra S"
+    found.save(tmp_path / "silo.json")
+    more = calibrate([SILO3.render().frame()], continue_from=tmp_path / "silo.json")
+    assert more.config["sensor"] == found.config["sensor"]
 
 
 def test_the_command_tells_what_failed(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

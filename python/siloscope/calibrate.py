@@ -117,7 +117,10 @@ def calibrate(
     answers = list(_answers(progress(source) if progress else source, one, jobs))
     lost = source.problems if isinstance(source, FrameSource) else []
     located = time.perf_counter()
-    config = {**settings.described(), "camera": _camera(before, answers)}
+    told = {name: value for name, value in (("sensor", sensor), ("diameter", diameter)) if value is not None}
+    brought = {} if before is not None else _brought(answers)
+    config = {**settings.described(), **{k: v for k, v in brought.items() if k not in told}}
+    config["camera"] = _camera(before, answers)
     found = _fused(_History.of(before).extended(answers, lost), rule, config)
     times = {"frames": 1e3 * (located - start), "fusion": 1e3 * (time.perf_counter() - located)}
     return replace(found, timing_ms=times)
@@ -182,6 +185,17 @@ class _Answer:
     estimate: Estimate | None
     error: InputError | None = None
     camera: Camera | None = None
+    made: bool = True
+    """Whether it was made here; False for an estimate that the caller brought."""
+
+
+def _brought(answers: list[_Answer]) -> dict[str, Any]:
+    """What the caller's estimates were made with, where all agree on it."""
+    configs = [answer.estimate.config for answer in answers if answer.estimate is not None and not answer.made]
+    if not configs or len(configs) < len(answers):
+        return {}
+    common = {name: [config.get(name) for config in configs] for name in ("sensor", "diameter")}
+    return {name: told[0] for name, told in common.items() if told[0] is not None and all(v == told[0] for v in told)}
 
 
 def _source(frames: Any, camera: Camera | None, depth_unit: float | None) -> Iterable[Any]:
@@ -212,7 +226,7 @@ Locate = Callable[[int, Any, Estimate | None], tuple[_Answer, Estimate | None]]
 def _locator(camera: Camera | None, depth_unit: float | None, settings: _Settings) -> Locate:
     def one(number: int, frame: Any, start: Estimate | None) -> tuple[_Answer, Estimate | None]:
         if isinstance(frame, Estimate):
-            return _Answer(f"estimate {number}", None, frame), None
+            return _Answer(f"estimate {number}", None, frame, made=False), None
         name = frame.source if isinstance(frame, Frame) else f"frame {number}"
         timestamp = frame.timestamp if isinstance(frame, Frame) else None
         known: dict[str, Any] = {"diameter": settings.diameter, "gravity": settings.gravity, "depth_unit": depth_unit}

@@ -282,7 +282,7 @@ def _gravity_check(pose: SiloPose, gravity: NDArray[np.float64]) -> dict[str, fl
     """The accelerometer's own angles beside the answer's (Table 7)."""
     from_gravity = SiloPose.from_axis(gravity, np.zeros(3))
     down = np.asarray(gravity, float) / np.linalg.norm(gravity)
-    angle = float(np.arccos(np.clip(down @ pose.axis_direction, -1.0, 1.0)))
+    angle = float(np.arccos(np.clip(abs(down @ pose.axis_direction), 0.0, 1.0)))  # both are lines
     return {"r_x": from_gravity.r_x, "r_y": from_gravity.r_y, "angle_to_axis": angle}
 
 

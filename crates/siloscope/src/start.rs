@@ -240,7 +240,7 @@ fn cone(i: &Oriented, j: &Oriented, k: &Oriented) -> Option<Hypothesis> {
     let sine = -i.n.dot(&x);
     let slope = sine / (1.0 - sine * sine).max(1e-12).sqrt();
     let above = |o: &Oriented| (o.p - a).dot(&x) < 0.0;
-    if x.z <= 0.0 || !(0.08..2.7).contains(&slope) || !(above(i) && above(j) && above(k)) {
+    if x.z <= 0.0 || !(0.8 * STEEPEST..SHALLOWEST).contains(&slope) || !(above(i) && above(j) && above(k)) {
         return None;
     }
     Some(Hypothesis { x, a, shape: Shape::Cone { slope }, score: 0.0 })

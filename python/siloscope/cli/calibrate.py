@@ -56,8 +56,11 @@ def calibrate(
             jobs=jobs or os.cpu_count() or 1,
             progress=lambda frames: track(frames, "locating", _count(source)),
         )
-    with writing(out):
-        found.save(out)
+    if _keeps_earlier(found, earlier, out):
+        say(f"{out} is left as it was")
+    else:
+        with writing(out):
+            found.save(out)
     if as_json:
         print_json(found.to_dict())
     else:
@@ -66,6 +69,11 @@ def calibrate(
     if not found.ok:
         return REFUSED
     return PARTIAL if found.counts["unreadable"] else 0
+
+
+def _keeps_earlier(found: Calibration, earlier: Path | None, out: Path) -> bool:
+    """Whether a refusal would take the place of the calibration that was to be gone on with."""
+    return not found.ok and earlier is not None and earlier.resolve() == out.resolve()
 
 
 def _count(source: FrameSource) -> int | None:
