@@ -49,17 +49,17 @@ class Camera:
     distortion: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
-        if not all(map(_is_number, self.distortion)):
+        if not all(map(is_number, self.distortion)):
             raise InputError(f"camera distortion is {self.distortion!r}; give the coefficients as numbers")
         object.__setattr__(self, "distortion", tuple(float(k) for k in self.distortion))
         for name in ("width", "height"):
             side = getattr(self, name)
-            if not _is_number(side) or not 1 <= side <= 20_000 or int(side) != side:
+            if not is_number(side) or not 1 <= side <= 20_000 or int(side) != side:
                 raise InputError(f"camera {name} is {side!r}; give a whole number of pixels between 1 and 20000")
             object.__setattr__(self, name, int(side))
         for name in ("fx", "fy", "cx", "cy"):
             value = getattr(self, name)
-            if not _is_number(value) or not math.isfinite(value) or (name in ("fx", "fy") and value <= 0.0):
+            if not is_number(value) or not math.isfinite(value) or (name in ("fx", "fy") and value <= 0.0):
                 raise InputError(f"camera {name} is {value!r}; give the sensor's own intrinsics with --camera FILE")
             object.__setattr__(self, name, float(value))
         if self.distortion_model not in DISTORTION_MODELS:
@@ -84,5 +84,6 @@ class Camera:
         return {**asdict(self), "distortion": list(self.distortion)}
 
 
-def _is_number(value: Any) -> bool:
+def is_number(value: Any) -> bool:
+    """Whether a caller's value is a real number, and neither text nor a truth value."""
     return isinstance(value, Real) and not isinstance(value, bool)

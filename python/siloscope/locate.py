@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from siloscope import sensors, shape_tensor, surface
-from siloscope.camera import Camera
+from siloscope.camera import Camera, is_number
 from siloscope.errors import UsageError
 from siloscope.estimate import Estimate
 from siloscope.frame import Frame
@@ -164,19 +163,15 @@ def _config(method: str, prepared: Prepared, settings: Settings) -> dict[str, An
 def _bounded(name: str, value: Number, least: float, most: float) -> Number:
     if value is None:
         return None
-    if not _is_number(value) or not least <= value <= most:
+    if not is_number(value) or not least <= value <= most:
         raise UsageError(f"{name} must be between {least:g} and {most:g} m, got {value}")
     return float(value)
 
 
 def _whole(name: str, value: float, least: int, most: int) -> float:
-    if not _is_number(value) or not least <= value <= most or value != int(value):
+    if not is_number(value) or not least <= value <= most or value != int(value):
         raise UsageError(f"{name} must be a whole number between {least} and {most}, got {value}")
     return value
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def _downwards(gravity: ArrayLike | None) -> NDArray[np.float64] | None:

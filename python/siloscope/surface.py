@@ -64,14 +64,15 @@ class SurfaceEvidence:
 class SurfaceDetails:
     """What pictures show of a fit.
 
-    `points` (N, 3): patches in the silo frame; `residuals` (N,): their distance from the wall, NaN where a patch is not
-    wall.
+    `points` (N, 3): patches in the silo frame, m; `residuals` (N,): their distance from the wall, m, NaN where a patch
+    is not wall.
     """
 
     points: NDArray[np.float64]
     residuals: NDArray[np.float64]
     wall: Any = None
-    """Where the frame shows the wall, for the next frames' fit to start from."""
+    """Where the frame's patches show the wall, for other frames of the camera to start from: a tuple that only the core
+    reads. None for clouds."""
     _labelled: Callable[[], NDArray[np.uint8]] | None = None
 
     @cached_property

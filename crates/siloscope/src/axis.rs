@@ -137,6 +137,9 @@ pub fn axis_point(estimates: &[AxisPoint], workers: &Workers) -> Option<Vector2<
     Some(Vector2::new(x?, y?))
 }
 
+/// Median of the chi-square distribution with one degree of freedom.
+pub const MEDIAN_OF_CHI_SQUARE: f64 = 0.455;
+
 /// Median; of an even number of values the mean of the middle two.
 pub fn median(mut values: Vec<f64>) -> Option<f64> {
     let (half, even) = (values.len() / 2, values.len().is_multiple_of(2));

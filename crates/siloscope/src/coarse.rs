@@ -5,7 +5,7 @@ use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, NoiseLaw};
 use crate::start::{Oriented, Start, View, other_part, starts, steeper_cone};
-use crate::surface::{Part, PlacedSurface};
+use crate::surface::{Part, PlacedSurface, Reach};
 use crate::taper::cone_instead;
 use crate::verdict::{WallEvidence, wall_evidence};
 use crate::vertex::is_covered;
@@ -96,23 +96,9 @@ fn candidates(problem: &Problem, view: View) -> Vec<(f64, Fit)> {
 }
 
 /// Whether a start value differs from a refined one by less than start values err: it would lead to the same answer.
-///
-/// Angles in radians, lengths as shares of the silo's size.
 fn is_near(start: &Start, fit: &Fit) -> bool {
-    let (a, b) = (&start.surface, &fit.surface);
-    let size = b.size();
-    let near = |x: Option<f64>, y: Option<f64>, reach: f64| match (x, y) {
-        (Some(x), Some(y)) => (x - y).abs() < reach,
-        (x, y) => x.is_none() && y.is_none(),
-    };
-    let tilt = (a.pose.r_x - b.pose.r_x).hypot(a.pose.r_y - b.pose.r_y);
-    let shift = (a.pose.t_x - b.pose.t_x).hypot(a.pose.t_y - b.pose.t_y);
-    start.inside == fit.inside
-        && tilt < 0.06
-        && shift < 0.15 * size
-        && near(a.radius, b.radius, 0.1 * size)
-        && near(a.cone.map(|c| c.slope), b.cone.map(|c| c.slope), 0.15)
-        && near(a.cone.map(|c| c.apex), b.cone.map(|c| c.apex), 0.3 * size)
+    const ERROR: Reach = Reach { tilt: 0.06, shift: 0.15, radius: 0.1, slope: 0.15, apex: 0.3 };
+    start.inside == fit.inside && start.surface.is_near(&fit.surface, &ERROR)
 }
 
 /// Refines a candidate on more patches and holds it against the evidence.

@@ -7,7 +7,7 @@ use crate::coarse::{Settled, settled, with_free_size};
 use crate::patches::Patches;
 use crate::refine::{Fit, Prior, Problem};
 use crate::sensor::{DepthBias, NoiseLaw};
-use crate::surface::SiloSurface;
+use crate::surface::{Reach, SiloSurface};
 
 /// Where another frame has found the wall, on patches.
 #[derive(Debug, Clone, Copy)]
@@ -28,10 +28,8 @@ pub struct KnownWall {
 const LEAST_SHARE: f64 = 0.35;
 /// Most misfit where the depth's bend is fitted too, as a share of the silo's size: a rough wall and a bent depth trade.
 const MOST_MISFIT: f64 = 1e-3;
-/// How far the wall may be from the known one: radians, and lengths as shares of the silo's size.
-const SAME_TILT: f64 = 0.01;
-const SAME_PLACE: f64 = 0.03;
-const SAME_SLOPE: f64 = 0.05;
+/// How far the wall may be from the known one.
+const SAME: Reach = Reach { tilt: 0.01, shift: 0.03, radius: 0.03, slope: 0.05, apex: 0.06 };
 /// Misfit of the first step as a multiple of the known one: it can only fall, and what agrees must not depend on it.
 const LOOSER: f64 = 6.0;
 
@@ -75,16 +73,6 @@ impl KnownWall {
 
     /// Whether a wall has the same parts, in the same place.
     pub fn is_same(&self, found: &SiloSurface) -> bool {
-        let near = |a: Option<f64>, b: Option<f64>, reach: f64| match (a, b) {
-            (Some(a), Some(b)) => (a - b).abs() < reach,
-            (a, b) => a.is_none() && b.is_none(),
-        };
-        let known = &self.surface;
-        let (a, b, reach) = (&found.pose, &known.pose, SAME_PLACE * known.size());
-        (a.r_x - b.r_x).hypot(a.r_y - b.r_y) < SAME_TILT
-            && (a.t_x - b.t_x).hypot(a.t_y - b.t_y) < reach
-            && near(found.radius, known.radius, reach)
-            && near(found.cone.map(|c| c.apex), known.cone.map(|c| c.apex), 2.0 * reach)
-            && near(found.cone.map(|c| c.slope), known.cone.map(|c| c.slope), SAME_SLOPE)
+        found.is_near(&self.surface, &SAME)
     }
 }

@@ -4,6 +4,7 @@
 //! (dust, edges). Everything up to the last step of the surface fit works on a few thousand patches, not pixels.
 
 use crate::Vec3;
+use crate::axis::{MEDIAN_OF_CHI_SQUARE, median};
 use crate::sensor::{DepthBias, NoiseLaw};
 
 /// A small piece of surface.
@@ -269,28 +270,19 @@ fn common_noise(tiles: &[Option<Tile>], columns: usize, law: &NoiseLaw) -> f64 {
     const PLAIN: f64 = 1.5; // chance and the surface's own shape reach this
     let ratio = |relief: f64| {
         let rows = tiles.chunks(columns.max(1)); // none in an image smaller than a tile
-        median_of(rows.flat_map(|row| row.windows(4).filter_map(|four| third_difference(four, law, relief))).collect())
+        let differences = rows.flat_map(|row| row.windows(4).filter_map(|four| third_difference(four, law, relief)));
+        median(differences.collect()).unwrap_or(1.0)
     };
     if ratio(DEEPEST) > PLAIN { ratio(0.0) } else { 1.0 }
 }
 
 /// Square of the third difference of four tiles' depths over what is expected of independent noise and of relief.
 fn third_difference(four: &[Option<Tile>], law: &NoiseLaw, relief: f64) -> Option<f64> {
-    const MEDIAN_OF_CHI_SQUARE: f64 = 0.455;
     let [Some(a), Some(b), Some(c), Some(d)] = four else { return None };
     let bend = a.plane.a - d.plane.a + 3.0 * (c.plane.a - b.plane.a);
     let variance = |t: &Tile| law.sigma(t.depth()).powi(2) / t.sums.n + relief * relief;
     let expected = variance(a) + 9.0 * (variance(b) + variance(c)) + variance(d);
     Some(bend * bend / (MEDIAN_OF_CHI_SQUARE * expected))
-}
-
-/// The median; 1 of nothing.
-fn median_of(mut values: Vec<f64>) -> f64 {
-    if values.is_empty() {
-        return 1.0;
-    }
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
 /// A tile's sums, its plane, and the pixels' scatter about it.

@@ -1,5 +1,6 @@
 //! The last steps of the fit: residuals of pixels, not tiles, against the exact wall.
 
+use crate::axis::{MEDIAN_OF_CHI_SQUARE, median};
 use crate::patches::{DepthImage, noise_from_scatter};
 use crate::pixels::{Sampling, tile_residual};
 use crate::refine::{Equation, Fit, Problem, System, tukey, tukey_slope};
@@ -110,15 +111,8 @@ pub fn patch_equations(problem: &Problem, fit: &Fit, wall: &[bool]) -> Vec<TileE
 
 /// What the residuals' variance is of the stated one: a neighbourhood's scatter also holds the wall's own curvature.
 fn noise_factor(equations: &[TileEquation]) -> f64 {
-    const MEDIAN_OF_CHI_SQUARE: f64 = 0.455;
-    let mut squares: Vec<f64> =
-        equations.iter().map(|e| e.equation.residual.powi(2) / e.equation.variance.max(1e-18)).collect();
-    if squares.is_empty() {
-        return 1.0;
-    }
-    let middle = squares.len() / 2;
-    let (_, &mut median, _) = squares.select_nth_unstable_by(middle, f64::total_cmp);
-    (median / MEDIAN_OF_CHI_SQUARE).clamp(1e-3, 1.0)
+    let squares = equations.iter().map(|e| e.equation.residual.powi(2) / e.equation.variance.max(1e-18));
+    median(squares.collect()).map_or(1.0, |middle| (middle / MEDIAN_OF_CHI_SQUARE).clamp(1e-3, 1.0))
 }
 
 /// A step this small is the last, in squared standard deviations; the next would be a hundredth of it.

@@ -52,6 +52,21 @@ pub struct Cone {
     pub apex: f64,
 }
 
+/// How far surfaces that are near each other may differ; lengths as shares of the silo's size.
+#[derive(Debug, Clone, Copy)]
+pub struct Reach {
+    /// Angle between the axes, radians.
+    pub tilt: f64,
+    /// Distance between the axes at the camera's height.
+    pub shift: f64,
+    /// Difference of the radii.
+    pub radius: f64,
+    /// Difference of the cones' slopes, metres of radius per metre of height.
+    pub slope: f64,
+    /// Difference of the vertices' heights.
+    pub apex: f64,
+}
+
 impl SiloSurface {
     /// z where the cylinder meets the cone; infinite on the side of the missing part.
     pub fn cylinder_bottom(&self) -> f64 {
@@ -65,6 +80,21 @@ impl SiloSurface {
     /// A length that tells how large the silo is: its radius, or the cone's radius halfway to the camera's height.
     pub fn size(&self) -> f64 {
         self.radius.or(self.cone.map(|c| 0.5 * c.slope * c.apex.abs())).unwrap_or(1.0)
+    }
+
+    /// Whether it has the same parts as another one, and in the same place.
+    pub fn is_near(&self, other: &Self, reach: &Reach) -> bool {
+        let size = other.size();
+        let near = |a: Option<f64>, b: Option<f64>, reach: f64| match (a, b) {
+            (Some(a), Some(b)) => (a - b).abs() < reach,
+            (a, b) => a.is_none() && b.is_none(),
+        };
+        let (a, b) = (&self.pose, &other.pose);
+        (a.r_x - b.r_x).hypot(a.r_y - b.r_y) < reach.tilt
+            && (a.t_x - b.t_x).hypot(a.t_y - b.t_y) < reach.shift * size
+            && near(self.radius, other.radius, reach.radius * size)
+            && near(self.cone.map(|c| c.slope), other.cone.map(|c| c.slope), reach.slope)
+            && near(self.cone.map(|c| c.apex), other.cone.map(|c| c.apex), reach.apex * size)
     }
 
     /// Adds a step of the fit; the depth bias is not part of the surface.
