@@ -145,7 +145,7 @@ def test_an_interruption_is_told_like_every_error(tmp_path: Path) -> None:
     arguments = ["simulate", "--steps", "100000", "--out", str(tmp_path / "frames"), "--json"]
     words = [sys.executable, "-m", "siloscope", *arguments]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
-        while not (tmp_path / "frames").exists():
+        while running.poll() is None and not (tmp_path / "frames").exists():
             time.sleep(0.01)
         running.send_signal(signal.SIGINT)
         out, err = running.communicate()
