@@ -22,15 +22,18 @@ from siloscope.pose import SiloPose
 from siloscope.surface import PARAMETERS, SurfaceEvidence
 
 LARGEST_FILE = 50_000_000
-"""Bytes; 300 frames of evidence take about 1 MB."""
+"""Bytes; 300 frames of evidence take about 2 MB."""
 
 LARGEST_NUMBER = 1e300
 """No number of a calibration is larger; whole numbers of JSON may be of any length."""
 
+MOST_RAYS = 1000
+"""No frame keeps as many."""
+
 REMEDY = "take the file as `siloscope calibrate` wrote it, or calibrate again"
 
 _UPPER = np.triu_indices(SIZE)
-_VECTORS = ("parameters", "gradient", "prior_mean", "prior_information")
+_VECTORS = ("parameters", "gradient", "prior_mean", "prior_information", "base")
 _MATRICES = ("information", "scatter", "noise")
 _SUM_VECTORS = ("origin", "pull", "prior_information", "prior_mean")
 _SUM_MATRICES = ("information", "noise", "shared")
@@ -76,6 +79,7 @@ def _frame_to_dict(number: int, frame: SurfaceEvidence) -> dict[str, Any]:
         **{name: _nullable(getattr(frame, name)) for name in _VECTORS},
         **{name: _triangle(getattr(frame, name)) for name in _MATRICES},
         "free": [bool(f) for f in frame.free],
+        "rays": frame.rays.tolist(),
         "scale_std": frame.scale_std,
     }
 
@@ -200,13 +204,27 @@ def _frame_evidence(table: dict[str, Any], where: str) -> tuple[int, SurfaceEvid
     free = _entry(table, "free", list, f"{where}.free")
     if len(free) != SIZE or not all(isinstance(f, bool) for f in free):
         raise _Wrong(f"'{where}.free' must be {SIZE} times true or false")
+    if "base" not in table and "rays" not in table:  # written before frames kept them
+        table = {**table, "base": table.get("parameters"), "rays": []}
     vectors = {name: _vector(table, name, f"{where}.{name}", nullable=name != "gradient") for name in _VECTORS}
     matrices = {name: _symmetric(table, name, f"{where}.{name}") for name in _MATRICES}
     scale_std = _number(table, "scale_std", least=0.0, where=where)
-    frame = SurfaceEvidence(**vectors, **matrices, free=np.array(free), scale_std=scale_std)
-    if not np.isfinite(frame.parameters[frame.free]).all():
-        raise _Wrong(f"'{where}.parameters' lacks a value that was estimated")
+    rays = _rays(table, f"{where}.rays")
+    frame = SurfaceEvidence(**vectors, **matrices, free=np.array(free), scale_std=scale_std, rays=rays)
+    for name in ("parameters", "base"):
+        if not np.isfinite(vectors[name][frame.free]).all():
+            raise _Wrong(f"'{where}.{name}' lacks a value that was estimated")
     return _index(table, where), frame
+
+
+def _rays(table: dict[str, Any], where: str) -> NDArray[np.float64]:
+    rows = _entry(table, "rays", list, where)
+    if len(rows) > MOST_RAYS or not all(isinstance(row, list) and len(row) == 3 for row in rows):
+        raise _Wrong(f"'{where}' must be at most {MOST_RAYS} times 3 numbers")
+    rays = np.array([[_finite(v, where) for v in row] for row in rows]).reshape(-1, 3)
+    if (rays[:, 2] < 0.0).any():
+        raise _Wrong(f"'{where}' has information below zero")
+    return rays
 
 
 def _sums(table: dict[str, Any]) -> Sums:

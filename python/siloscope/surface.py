@@ -58,6 +58,11 @@ class SurfaceEvidence:
     """How firmly, as 1/variance; 0 where nothing was expected."""
     scale_std: float
     """Standard deviation of the depth scale where no frame can tell it, else 0."""
+    base: NDArray[np.float64]
+    """Where the frame's equations were made, near `parameters`; NaN where they are."""
+    rays: NDArray[np.float64]
+    """(K, 3): (x, y) of rays (x, y, 1) to some of the wall that was seen, and their information, 1/m². None where the
+    depth bias is known: the equations hold far enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -312,4 +317,6 @@ def _evidence(
         prior_mean=expected,
         prior_information=prior,
         scale_std=0.0 if free[8] else profile.bias_std[1],
+        base=found["base"],
+        rays=found["rays"],
     )

@@ -1,7 +1,7 @@
 //! The surface fit.
 
 use crate::convert::value_error;
-use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
+use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use siloscope::fit::{Knowledge, Outcome, SurfaceFit, fit_cloud, fit_image};
@@ -11,7 +11,8 @@ use siloscope::patches::DepthImage;
 use siloscope::refusal::Refusal;
 use siloscope::sensor::{DepthBias, DepthError, NoiseLaw};
 use siloscope::share::FrameShare;
-use siloscope::surface::{Cone, PARAMETERS, SiloSurface};
+use siloscope::straight::{Ray, Straight};
+use siloscope::surface::{Cone, Information, PARAMETERS, Parameters, SiloSurface};
 use siloscope::workers::Workers;
 use siloscope::{SiloPose, Vec3};
 
@@ -145,6 +146,8 @@ fn add_share(py: Python<'_>, out: &Bound<'_, PyDict>, share: &FrameShare) -> PyR
     }
     out.set_item("step", PyArray1::from_slice(py, share.step.as_slice()))?;
     out.set_item("gradient", PyArray1::from_slice(py, share.gradient.as_slice()))?;
+    out.set_item("base", PyArray1::from_slice(py, share.base.as_slice()))?;
+    out.set_item("rays", PyArray1::from_vec(py, share.rays.concat()).reshape([share.rays.len(), 3])?)?;
     out.set_item("prior", PyArray1::from_slice(py, share.prior.as_slice()))
 }
 
@@ -192,6 +195,47 @@ fn result<'py>(py: Python<'py>, found: &SurfaceFit) -> PyResult<Bound<'py, PyDic
     Ok(out)
 }
 
+type StepsAndTurns<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
+
+/// Steps (N, 12) and their derivatives (N, 12, 12): what of N frames' equations, made at `bases` (N, 12) with `rays`
+/// (N, K, 3) and `free` parameters (N, 12), predicts the readings of the walls at `places` (N, 12).
+#[pyfunction]
+fn surface_seen_from<'py>(
+    py: Python<'py>,
+    bases: PyReadonlyArray2<'py, f64>,
+    rays: PyReadonlyArray3<'py, f64>,
+    free: PyReadonlyArray2<'py, bool>,
+    places: PyReadonlyArray2<'py, f64>,
+) -> PyResult<StepsAndTurns<'py>> {
+    let count = bases.shape()[0];
+    let whole = bases.shape()[1] == PARAMETERS && rays.shape()[2] == 3;
+    if !whole || rays.shape()[0] != count || free.shape() != bases.shape() || places.shape() != bases.shape() {
+        let shapes = (bases.shape(), rays.shape(), free.shape(), places.shape());
+        return Err(value_error(format!("bases, rays, free and places have shapes {shapes:?}")));
+    }
+    let (bases, rays, free, places) = (bases.as_array(), rays.as_array(), free.as_array(), places.as_array());
+    let vector = |row: numpy::ndarray::ArrayView1<f64>| Parameters::from_iterator(row.iter().copied());
+    let seen: Vec<(Parameters, Information)> = py.detach(|| {
+        let frame = |n: usize| {
+            let (base, place) = (vector(bases.row(n)), vector(places.row(n)));
+            let of_frame: Vec<Ray> = rays
+                .outer_iter()
+                .nth(n)
+                .map_or(Vec::new(), |r| r.outer_iter().map(|ray| [ray[0], ray[1], ray[2]]).collect());
+            let gap = (place - base).map(|v| if v.is_finite() { v } else { 0.0 });
+            let free = std::array::from_fn(|k| free[(n, k)]);
+            Straight::new(&base, &of_frame, free)
+                .map_or((gap, Information::identity()), |frame| frame.seen_from(&place))
+        };
+        (0..count).map(frame).collect()
+    });
+    let steps: Vec<f64> = seen.iter().flat_map(|(step, _)| step.iter().copied()).collect();
+    let turns: Vec<f64> =
+        seen.iter().flat_map(|(_, turn)| turn.transpose().iter().copied().collect::<Vec<_>>()).collect();
+    let steps = PyArray1::from_vec(py, steps).reshape([count, PARAMETERS])?;
+    Ok((steps, PyArray1::from_vec(py, turns).reshape([count, PARAMETERS, PARAMETERS])?))
+}
+
 /// Every reason for which the surface fit refuses a frame: stable name, what it means, what to try.
 #[pyfunction]
 fn surface_refusals() -> Vec<(&'static str, &'static str, &'static str)> {
@@ -201,5 +245,6 @@ fn surface_refusals() -> Vec<(&'static str, &'static str, &'static str)> {
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(surface_fit_image, m)?)?;
     m.add_function(wrap_pyfunction!(surface_fit_cloud, m)?)?;
+    m.add_function(wrap_pyfunction!(surface_seen_from, m)?)?;
     m.add_function(wrap_pyfunction!(surface_refusals, m)?)
 }

@@ -14,6 +14,7 @@ use crate::refine::{Fit, Prior, Problem, free_parameters, tukey};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, DepthError, NoiseLaw};
 use crate::share::{FrameShare, among};
+use crate::straight::{parameters_of, some_rays};
 use crate::surface::{Information, OVALITY, PARAMETERS, Parameters, PlacedSurface};
 use crate::verdict::WallEvidence;
 use crate::workers::Workers;
@@ -283,6 +284,7 @@ fn finish(
     (evidence, wall): (WallEvidence, KnownWall),
     noise_is_known: bool,
 ) -> Outcome {
+    let base = parameters_of(&fit.surface, &fit.bias);
     let system = solve_equations(problem, &mut fit, tiles, 4).ok_or(Refusal::PoorlyDetermined)?;
     let pulls: Vec<f64> = tiles.iter().map(TileEquation::pull).collect();
     let free = free_parameters(&fit, &system.prior);
@@ -295,7 +297,9 @@ fn finish(
     let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
     check_determined(&covariance, &placed, heights / tiles.len().max(1) as f64)?;
-    let share = FrameShare::new((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free));
+    let bias_is_free = free[7..OVALITY].contains(&true);
+    let rays = if bias_is_free { some_rays(tiles, |patch| problem.patches.list[patch].q) } else { Vec::new() };
+    let share = FrameShare::new((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free), (base, rays));
     let mut covariance = among(&covariance, &free);
     if !free[8] {
         covariance += scale_uncertainty(&fit, problem.prior.bias_std[1]);

@@ -37,6 +37,7 @@ pub mod sensor;
 pub mod shape_tensor;
 pub mod share;
 pub mod start;
+pub mod straight;
 pub mod surface;
 pub mod taper;
 pub mod verdict;

@@ -8,6 +8,7 @@
 
 use crate::polish::TileEquation;
 use crate::refine::{System, tukey};
+use crate::straight::Ray;
 use crate::surface::{Information, OVALITY, PARAMETERS, Parameters};
 
 /// What one frame alone says.
@@ -25,15 +26,21 @@ pub struct FrameShare {
     pub noise: Information,
     /// Information of the priors, which were used but are not contained in the others.
     pub prior: Parameters,
+    /// Where the frame's equations were made: the wall and bias of which Λ has the derivatives; NaN for what is not there.
+    pub base: Parameters,
+    /// Some of its rays, to tell what it says about walls far from there; none where the depth bias is known.
+    pub rays: Vec<Ray>,
 }
 
 impl FrameShare {
     /// From the system of all parameters with its covariance, as the noise has it and as the residuals have it; the
-    /// last equations and how they pull; and which parameters are free in the frame's own answer, and here.
+    /// last equations and how they pull; which parameters are free in the frame's own answer, and here; where the
+    /// equations were made, and on which rays.
     pub fn new(
         (system, model, covariance): (&System, &Information, &Information),
         (tiles, pulls): (&[TileEquation], &[f64]),
         (alone, free): (&[bool; PARAMETERS], &[bool; PARAMETERS]),
+        (base, rays): (Parameters, Vec<Ray>),
     ) -> Self {
         let mut information = system.information - system.prior;
         information.fill_upper_triangle_with_lower_triangle();
@@ -53,7 +60,7 @@ impl FrameShare {
         }
         let joint = among(&(information + system.prior), free);
         let scatter = joint * covariance * joint - among(&system.prior, free);
-        Self { step, information, gradient, scatter, noise, prior: system.prior.diagonal() }
+        Self { step, information, gradient, scatter, noise, prior: system.prior.diagonal(), base, rays }
     }
 }
 
