@@ -15,8 +15,10 @@ import pytest
 
 from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, calibrate, locate, sensors
 from siloscope.cli import main
-from siloscope.paper.scenarios import scenario
-from siloscope.scene import ASTRA_S, Scene, discharge
+from siloscope.fusion import Stack
+from siloscope.paper.scenarios import random_scene, scenario
+from siloscope.scene import ASTRA_S, Feed, Scene, discharge
+from siloscope.straight import straightened
 from siloscope.surface import fit_depth
 
 SILO3 = replace(scenario("silo3"), sensor=ASTRA_S)
@@ -89,6 +91,70 @@ def test_the_same_frame_many_times_is_no_surer_where_frames_share_their_error() 
     assert many.silo_std.apex is not None
     assert many.silo_std.apex > 0.9 * one.silo_std.apex  # the scale is not known, however many frames there are
     assert stds(many)[0] < 0.9 * stds(one)[0]
+
+
+@functools.cache
+def unseen(seed: int, shape: str, diameter: bool) -> tuple[Scene, tuple[Estimate, ...]]:
+    """A silo emptied before a sensor of which nothing is known, and what its frames say."""
+    level = float(np.random.default_rng((seed, 11)).uniform(0.05, 0.55))
+    scene = random_scene(seed, Feed(shape, level, seed=seed), sensor=ASTRA_S)
+    known = {"diameter": 2.0 * scene.silo.radius} if diameter else {}
+    return scene, tuple(located(step, None, **known) for step in discharge(scene, 6, 0.55, 0.05))
+
+
+@pytest.mark.parametrize("diameter", [False, True])
+@pytest.mark.parametrize(("seed", "shape"), [(1021, "funnel"), (2018, "gaussian+tilted"), (1078, "gaussian+tilted")])
+def test_frames_that_leave_a_bent_valley_open_meet_where_their_valleys_do(
+    seed: int, shape: str, diameter: bool
+) -> None:
+    scene, frames = unseen(seed, shape, diameter)
+    found = calibrate(frames)
+    assert found.counts["rejected"] <= 1  # one frame of 2018 took something else for the wall
+    assert found.excess < 1.5
+    assert (np.abs(errors(found, scene)) < 3.0 * stds(found)).all()
+
+
+def test_frames_agree_once_their_equations_are_made_about_the_common_answer() -> None:
+    _, frames = unseen(1021, "funnel", False)
+    found = calibrate(frames)
+    assert found.parameters is not None
+    alone = Stack([e.evidence for e in frames if e.evidence])
+    furthest = [np.sqrt(s.distances(found.parameters[None])[0] / s.dof).max() for s in (alone, straightened(alone))]
+    assert furthest[0] > 10.0
+    assert furthest[1] < 2.0
+
+
+def test_a_known_sensor_needs_no_second_look() -> None:
+    stack = Stack([e.evidence for e in sequence() if e.evidence])
+    assert straightened(stack) is stack
+    assert stack.rays.size == 0
+
+
+def test_evidence_from_before_frames_kept_their_rays_is_still_used(tmp_path: Path) -> None:
+    found = calibrate(sequence(sensor=None))
+    document = json.loads(json.dumps(found.to_dict()))
+    for frame in document["evidence"]["frames"]:
+        del frame["base"], frame["rays"]
+    path = tmp_path / "older.json"
+    path.write_text(json.dumps(document))
+    older = calibrate(sequence(2, 0.2, 0.1, sensor=None), continue_from=path)
+    assert older.counts["used"] >= 8
+    assert (np.abs(errors(older)) < 3.0 * stds(older)).all()
+
+
+@pytest.mark.parametrize("diameter", [None, 3.0])
+@pytest.mark.parametrize(("turn", "shift"), [(0.002, 0.0), (0.0, 0.1)])
+def test_a_move_before_an_unknown_sensor_is_found_where_it_was(
+    turn: float, shift: float, diameter: float | None
+) -> None:
+    known: dict[str, Any] = {"sensor": None, "diameter": diameter}
+    new = moved(turn, shift)
+    before = [located(scene, **known) for scene in discharge(SILO3, 12, 0.5, 0.3)]
+    found = calibrate([*before, *(located(scene, **known) for scene in discharge(new, 12, 0.28, 0.1))])
+    assert [move.index for move in found.moves] == [12]
+    assert found.moves[0].turn == pytest.approx(turn, abs=2e-4)
+    assert found.moves[0].shift == pytest.approx(shift, rel=0.03, abs=2e-4)
+    assert (np.abs(errors(found, new)) < 3.0 * stds(found)).all()
 
 
 def test_noise_averages_down() -> None:
@@ -309,6 +375,10 @@ DAMAGES = {
     "evidence": (["evidence", "frames", 1, "information"], [0.0], "78 numbers"),
     "evidence's free": (["evidence", "frames", 1, "free"], [1] * 10, "evidence.frames[1].free"),
     "evidence's hole": (["evidence", "frames", 1, "parameters", 0], None, "lacks a value"),
+    "evidence's base": (["evidence", "frames", 1, "base", 0], None, "lacks a value"),
+    "evidence's rays": (["evidence", "frames", 1, "rays"], [[0.1, 0.2]], "3 numbers"),
+    "rays below nothing": (["evidence", "frames", 1, "rays"], [[0.1, 0.2, -1.0]], "below zero"),
+    "rays without a base": (["evidence", "frames", 1, "base"], None, "evidence.frames[1].base"),
     "sums": (["evidence", "earlier"], [], "evidence.earlier"),
     "config": (["config"], None, "config"),
     "endless number": (["r_x"], 10**400, "finite"),

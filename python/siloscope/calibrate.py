@@ -25,9 +25,10 @@ from siloscope.frame import Frame
 from siloscope.frames import FrameSource
 from siloscope.fusion import Fused, Stack, Sums, fuse, sums
 from siloscope.locate import locate
-from siloscope.moves import Move, find_moves
+from siloscope.moves import Move, find_moves, may_have_moved
 from siloscope.pose import SiloPose
 from siloscope.sensors import SensorProfile
+from siloscope.straight import at_bias, bias_is_free, straightened
 from siloscope.surface import PARAMETERS, SurfaceEvidence, geometry
 
 RULES = ("information", "mean-of-last-10")
@@ -336,24 +337,41 @@ def _fused(history: _History, rule: str, config: dict[str, Any]) -> Calibration:
         raise UsageError(
             "fusing by information needs estimates of method surface; give those, or choose the rule mean-of-last-10"
         )
-    return _by_information(_since_the_last_move(history), config)
+    return _by_information(*_since_the_last_move(history), config)
 
 
-def _since_the_last_move(history: _History) -> _History:
-    """Only the evidence since the camera last moved."""
-    stack = Stack([evidence for _, evidence in history.evidence])
-    moves = find_moves(stack, history.earlier)
-    if not moves:
-        return history
-    first = moves[-1].index
-    told = tuple(replace(move, index=history.evidence[move.index][0]) for move in moves)
-    return replace(history, evidence=history.evidence[first:], earlier=None, moves=(*history.moves, *told))
+def _since_the_last_move(history: _History) -> tuple[_History, Stack, Fused]:
+    """Only the evidence since the camera last moved, and what it says.
+
+    With an unknown bias a move is seen sharply only where the frames' equations are made about the bias. The bias is
+    told by frames between which the camera has not moved; so moves are looked for twice where there may be one.
+    """
+    stack = _stack(history)
+    found = _fused_since(history, stack, find_moves(stack, history.earlier))
+    if bias_is_free(stack) and (found[0].moves != history.moves or may_have_moved(found[2])):
+        about_bias = at_bias(stack, found[2].parameters)
+        found = _fused_since(history, stack, find_moves(about_bias, history.earlier))
+    return found
 
 
-def _by_information(history: _History, config: dict[str, Any]) -> Calibration:
+def _fused_since(history: _History, stack: Stack, moves: list[Move]) -> tuple[_History, Stack, Fused]:
+    """The evidence since the last of these moves, fused; `stack` is that of all."""
+    if moves:
+        first = moves[-1].index
+        told = tuple(replace(move, index=history.evidence[move.index][0]) for move in moves)
+        history = replace(history, evidence=history.evidence[first:], earlier=None, moves=(*history.moves, *told))
+        stack = _stack(history)
+    stack = straightened(stack, history.earlier)
+    return history, stack, fuse(stack, history.earlier)
+
+
+def _stack(history: _History) -> Stack:
     stack = Stack([evidence for _, evidence in history.evidence])
     _check_common(stack)
-    fused = fuse(stack, history.earlier)
+    return stack
+
+
+def _by_information(history: _History, stack: Stack, fused: Fused, config: dict[str, Any]) -> Calibration:
     history = replace(history, records=_judged(history, fused))
     if not _determined(fused):
         return _refused("frames-disagree", history, "information", config)

@@ -25,6 +25,9 @@ LENGTHS = tuple(PARAMETERS.index(name) for name in ("t_x", "t_y", "radius", "ape
 AGREE = 2.58
 """A frame counts fully up to this many standard deviations (99 % of a normal variable), not at all beyond √2 times."""
 
+FAR = 4.0
+"""A frame further from an answer than so many standard deviations costs no more than that."""
+
 STARTS = 12
 """Frames from which the search for the majority's answer starts."""
 
@@ -70,21 +73,24 @@ class Stack:
         self.information = _stacked([f.information for f in frames], (SIZE, SIZE))
         self.gradient = _stacked([f.gradient for f in frames], (SIZE,))
         self.noise = _stacked([f.noise for f in frames], (SIZE, SIZE))
-        scatter = _stacked([f.scatter for f in frames], (SIZE, SIZE))
+        self.scatter = _stacked([f.scatter for f in frames], (SIZE, SIZE))
         self.prior = _stacked([f.prior_information for f in frames], (SIZE,))
         self.expected = _stacked([f.prior_mean for f in frames], (SIZE,))
         both = self.free[:, :, None] & self.free[:, None, :]
-        self.shared = _positive(np.where(both, scatter - self.noise, 0.0))
-        self.metric = self._metric(scatter, both)
+        self.shared = _positive(np.where(both, self.scatter - self.noise, 0.0))
+        self.metric = self._metric()
         self.dof = self.free.sum(axis=1)
         self.scale_std = max((f.scale_std for f in frames), default=0.0)
+        self.base = _stacked([f.base for f in frames], (SIZE,))
+        self.rays = _padded([f.rays for f in frames])
 
-    def _metric(self, scatter: Matrix, both: NDArray[np.bool_]) -> Matrix:
+    def _metric(self) -> Matrix:
         """Inverse covariances ``H (S + Π)⁻¹ H`` of the frames' own answers, H = Λ + Π; zero where not free."""
+        both = self.free[:, :, None] & self.free[:, None, :]
         prior = np.einsum("ni,ij->nij", self.prior, np.eye(SIZE))
         joint = np.where(both, self.information + prior, 0.0)
         fixed = np.einsum("ni,ij->nij", ~self.free, np.eye(SIZE))
-        spread = np.where(both, scatter + prior, 0.0) + fixed
+        spread = np.where(both, self.scatter + prior, 0.0) + fixed
         scale = 1.0 / np.sqrt(np.maximum(np.einsum("nii->ni", spread), 1e-300))
         spread = spread * scale[:, :, None] * scale[:, None, :]
         joint = joint * scale[:, :, None]
@@ -98,6 +104,15 @@ class Stack:
             part.__dict__[name] = value[which] if isinstance(value, np.ndarray) else value
         part.count = len(part.answers)
         return part
+
+    def replaced(self, which: NDArray[np.bool_], anew: dict[str, NDArray[np.float64]]) -> Stack:
+        """The frames `which` (N,) with other arrays."""
+        changed = self.take(slice(None))
+        for name, value in anew.items():
+            keep = which.reshape(-1, *[1] * (value.ndim - 1))
+            changed.__dict__[name] = np.where(keep, value, getattr(self, name))
+        changed.metric = changed._metric()
+        return changed
 
     def distances(self, centres: Matrix) -> Matrix:
         """Squared distances (K, N) of the frames' answers from K `centres` (K, 12), each in its own covariance."""
@@ -134,7 +149,22 @@ def fuse(stack: Stack, earlier: Sums | None = None) -> Fused:
     """Robust fusion: the answer of the majority, then every frame weighed by how well it agrees."""
     base = earlier or Sums.nothing()
     everyone = np.ones((1, stack.count), bool)
-    centre = majority(stack, everyone, _starts(stack), base)
+    found = _reweighted(stack, base, majority(stack, everyone, _starts(stack), base))
+    if (found[1] < 0.5).any():  # half of a few frames may agree by chance where each leaves much open: do all agree?
+        other = _reweighted(stack, base, solve(stack, everyone.astype(float), base))
+        found = min(found, other, key=lambda answer: _cost(stack, answer[0]))
+    centre, weights, excess = found
+    return _with_covariance(stack, weights, base, centre[0], excess)
+
+
+def _cost(stack: Stack, centre: Matrix) -> float:
+    """Sum of the squared deviations from an answer, of no frame more than `FAR`."""
+    off = np.clip(deviation(stack.distances(centre)[0], stack.dof), 0.0, FAR)
+    return float((off**2).sum())
+
+
+def _reweighted(stack: Stack, base: Sums, centre: Matrix) -> tuple[Matrix, Vector, float]:
+    """The answer near a first one, with each frame weighed by how well it agrees; the weights, and the excess."""
     weights, excess = np.ones(stack.count), 1.0
     for _ in range(30):
         squared, counts = stack.distances(centre)[0], weights > 0.0
@@ -145,13 +175,13 @@ def fuse(stack: Stack, earlier: Sums | None = None) -> Fused:
         weights = new
         if settled:
             break
-    return _with_covariance(stack, weights, base, centre[0], excess)
+    return centre, weights, excess
 
 
 def solve(stack: Stack, weights: Matrix, base: Sums) -> Matrix:
     """Answers (K, 12) to K weightings (K, N): ``(Σ w Λ + Π)⁻¹ (Σ w (Λ θ - g) + Π μ)``; NaN for what nobody saw."""
     system, pull, origin, solved = _systems(stack, weights, base)
-    answers = origin + _solve(system, pull[:, :, None])[:, :, 0]
+    answers = origin + solved_by_frame(system, pull[:, :, None])[:, :, 0]
     answers[:, :BIAS][~solved[:, :BIAS]] = np.nan
     return answers
 
@@ -286,7 +316,7 @@ def _with_covariance(stack: Stack, weights: Vector, base: Sums, centre: Vector, 
     system, solved = systems[0], solved[0]
     total = sums(stack, weights, origin, base)
     spread = np.diag(total.prior_information) + excess * (total.noise + total.weight * total.shared)
-    inverse = _solve(system, np.eye(SIZE))
+    inverse = solved_by_frame(system, np.eye(SIZE))
     covariance = inverse @ np.where(solved[:, None] & solved, spread, 0.0) @ inverse
     scale_std = 0.0 if solved[SCALE] else stack.scale_std
     covariance += _scale_share(centre, scale_std)
@@ -306,7 +336,7 @@ def _scale_share(centre: Vector, std: float) -> Matrix:
     return np.outer(share, share)
 
 
-def _solve(system: Matrix, right: NDArray[np.float64]) -> NDArray[np.float64]:
+def solved_by_frame(system: Matrix, right: NDArray[np.float64]) -> NDArray[np.float64]:
     """Solution of symmetric equations whose unknowns differ by many orders of magnitude."""
     scale = 1.0 / np.sqrt(np.maximum(np.einsum("...ii->...i", system), 1e-300))[..., None]
     scaled = system * scale * np.swapaxes(scale, -1, -2)
@@ -321,6 +351,14 @@ def _positive(matrices: Matrix) -> Matrix:
     clipped = np.einsum("nij,nj,nkj->nik", vectors, np.maximum(values, 0.0), vectors)
     positive: Matrix = clipped * scale[:, :, None] * scale[:, None, :]
     return positive
+
+
+def _padded(rays: Sequence[Matrix]) -> Matrix:
+    """(N, K, 3) of N times (up to K, 3), filled up with rays that tell nothing."""
+    padded = np.zeros((len(rays), max(map(len, rays), default=0), 3))
+    for row, own in zip(padded, rays, strict=True):
+        row[: len(own)] = own
+    return padded
 
 
 def _stacked(rows: Sequence[NDArray[np.generic]], shape: tuple[int, ...]) -> NDArray[np.float64]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.fusion import BIAS, RADIUS, SCALE, SIZE, Fused, Stack, Sums, deviation, fuse, majority, sums
+from siloscope.fusion import BIAS, FAR, RADIUS, SCALE, SIZE, Fused, Stack, Sums, deviation, fuse, majority, sums
 
 SHORTEST = 3
 """A move needs this many agreeing frames on both sides; fewer are bad frames."""
@@ -20,9 +20,6 @@ SMALLEST_TURN = 5e-4
 
 SMALLEST_SHIFT = 1e-3
 """Shifts below this are not worth telling, m."""
-
-FAR = 4.0
-"""A frame further from its segment than so many standard deviations costs no more than that."""
 
 FEW_STARTS = 4
 """Starts of the robust fits while looking for the place."""
@@ -62,6 +59,12 @@ def find_moves(stack: Stack, earlier: Sums | None = None, first: int = 0) -> lis
         return []
     before, after = stack.take(slice(0, split)), stack.take(slice(split, None))
     return [*find_moves(before, earlier, first), move, *find_moves(after, None, first + split)]
+
+
+def may_have_moved(fused: Fused) -> bool:
+    """Whether as many frames as a move needs were left out one after the other."""
+    left_out = fused.weights < 0.5
+    return any(left_out[first : first + SHORTEST].all() for first in range(len(left_out) - SHORTEST + 1))
 
 
 def _best_split(stack: Stack, earlier: Sums | None) -> int | None:
