@@ -163,6 +163,27 @@ def test_feed_stuck_above_the_cone_is_not_taken_for_the_cylinder(seed: int, shap
     assert found.silo.radius is None or found.silo.radius == pytest.approx(scene.silo.radius, abs=0.005)
 
 
+@pytest.mark.parametrize(
+    ("seed", "shape", "level", "wall"),
+    [
+        (7077, "mound", 0.3356, "film,auger,dents,oval"),
+        (3017, "mound", 0.1697, "film,auger,dents,oval"),
+        (3012, "mound", 0.324, "film,auger,dents,oval"),
+        (3028, "mound", 0.3, "film,oval"),
+    ],
+)
+def test_stuck_feed_that_is_much_of_the_view_is_not_taken_for_the_wall(
+    seed: int, shape: str, level: float, wall: str
+) -> None:
+    scene = in_use(seed, shape, level, wall)
+    found = fit(scene, "orbbec-astra-s")
+    assert found.pose is not None, found.message
+    assert found.covariance is not None
+    error = np.array([getattr(found.pose, k) - getattr(scene.pose, k) for k in ("r_x", "r_y", "t_x", "t_y")])
+    assert np.all(np.abs(error) < 3.0 * np.sqrt(found.covariance.diagonal()))
+    assert gap(found, scene) < 3.0
+
+
 def test_an_auger_in_view_is_no_silo_seen_from_outside() -> None:
     scene = in_use(1056, "funnel", 0.2966, "film,auger,dents,oval")
     assert fit(scene, "orbbec-astra-s").status == "refused"

@@ -1,5 +1,6 @@
 //! From start values to a fit on patches that stands up to the evidence.
 
+use crate::outermost::outermost;
 use crate::patches::{NONE, Patches};
 use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
@@ -111,6 +112,10 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
         fit = without_feed(problem, fit)?;
     }
     let mut wall = wall_patches(problem, &fit);
+    if let Some(outer) = outermost(problem, &fit, &wall) {
+        wall = wall_patches(problem, &outer);
+        fit = outer;
+    }
     if let Some(cone) = cone_instead(problem, &fit, &wall) {
         wall = wall_patches(problem, &cone);
         fit = cone;

@@ -10,7 +10,7 @@ use crate::covariance::{
 use crate::known_wall::{KnownWall, confirmed};
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
-use crate::refine::{Fit, Prior, Problem, free_parameters, tukey};
+use crate::refine::{Fit, OVALITY_STD, Prior, Problem, free_parameters, tukey};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, DepthError, NoiseLaw};
 use crate::share::{FrameShare, among};
@@ -56,9 +56,6 @@ pub struct SurfaceFit {
     /// Milliseconds of each stage, in order.
     pub timing: Vec<(&'static str, f64)>,
 }
-
-/// Standard deviation of each part of a real silo's ovality.
-const OVALITY_STD: f64 = 0.005;
 
 /// How far a wall that shows ovality, and so is no ideal one, lies off its mean over a block of tiles, metres.
 const WALL_FORM: f64 = 2.5e-4;
@@ -115,7 +112,9 @@ fn measured(
 ) -> Outcome {
     let mut known = KnownWall::of(&found);
     let Settled { mut fit, wall, evidence } = found;
-    let mut prior = problem.prior.clone();
+    let round = fit.surface.ovality == [0.0; 2];
+    let prior = if round { problem.prior.clone() } else { problem.prior.with_ovality() };
+    let problem = Problem { prior: &prior, ..problem };
     if let (Some((radius, _)), true) = (know.radius, prior.bias_std[1] > 0.0) {
         fit.rescale_to(radius);
     }
@@ -123,21 +122,20 @@ fn measured(
     drop_film(&problem, &mut fit, &wall);
     known.drop_parts_without(&fit.surface);
     let (noise, mut equations) = on_pixels(problem, image, &mut fit, &wall, know.error.noise, looks);
-    let round = Problem { noise, ..problem };
-    if may_be_feed(&round, &fit) {
+    let problem = Problem { noise, ..problem };
+    if may_be_feed(&problem, &fit) {
         // on its pixels the cone is less steep than on patches
         fit.surface.radius.ok_or(Refusal::ConeMayBeFeed)?;
         fit.surface.cone = None;
         known.drop_parts_without(&fit.surface);
-        (_, equations) = on_pixels(round, image, &mut fit, &wall, Some(noise), Looks::Usual);
+        (_, equations) = on_pixels(problem, image, &mut fit, &wall, Some(noise), Looks::Usual);
     }
-    known.oval = shows_ovality(&round, &fit, &mut equations, OVALITY_STD);
-    if known.oval {
-        prior.ovality_std = OVALITY_STD;
-        let oval = Problem { prior: &prior, ..round };
-        (_, equations) = on_pixels(oval, image, &mut fit, &wall, Some(noise), Looks::Usual);
+    let oval = prior.with_ovality();
+    known.oval = !round || shows_ovality(&problem, &fit, &mut equations, OVALITY_STD);
+    let problem = if known.oval { Problem { prior: &oval, ..problem } } else { problem };
+    if known.oval && round {
+        (_, equations) = on_pixels(problem, image, &mut fit, &wall, Some(noise), Looks::Usual);
     }
-    let problem = Problem { prior: &prior, ..round };
     clock.lap("pixels");
     let result = finish(&problem, fit, &mut equations, (evidence, known), know.error.noise.is_some());
     clock.lap("covariance");

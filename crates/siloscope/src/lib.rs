@@ -26,6 +26,7 @@ pub mod locate;
 pub mod nearest;
 pub mod neighbours;
 pub mod normals;
+pub mod outermost;
 pub mod patches;
 pub mod pixels;
 pub mod polish;

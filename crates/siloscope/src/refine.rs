@@ -25,6 +25,16 @@ pub struct Prior {
     pub ovality_std: f64,
 }
 
+/// Standard deviation of each part of a real silo's ovality.
+pub const OVALITY_STD: f64 = 0.005;
+
+impl Prior {
+    /// The same for a silo that may be oval.
+    pub fn with_ovality(&self) -> Self {
+        Self { ovality_std: OVALITY_STD, ..self.clone() }
+    }
+}
+
 /// State of the fit.
 #[derive(Debug, Clone)]
 pub struct Fit {
@@ -99,6 +109,14 @@ pub struct Contact {
     rate: f64,
 }
 
+impl Contact {
+    /// Variance of the residual by the noise alone.
+    pub fn noise(&self, fit: &Fit) -> f64 {
+        let misfit = fit.misfit / self.cosine;
+        (self.variance - misfit * misfit).max(0.0)
+    }
+}
+
 impl Problem<'_> {
     /// Patch `i` against the wall; `None` where its ray runs along the wall or it straddles the joint.
     #[inline(always)]
@@ -145,8 +163,8 @@ impl Problem<'_> {
     /// The equation of a contact, with its derivative on the wall where the depth bias is free.
     ///
     /// The bias trades against the pose along a weak direction, in which the noise in derivatives outweighs the frame.
-    #[inline]
-    fn stable_equation(&self, fit: &Fit, placed: &PlacedSurface, contact: &Contact, i: usize) -> Equation {
+    #[inline(always)]
+    pub fn stable_equation(&self, fit: &Fit, placed: &PlacedSurface, contact: &Contact, i: usize) -> Equation {
         if self.patches.cloud || self.prior.bias_std[2] == 0.0 {
             return self.equation_of(placed, contact);
         }
@@ -176,6 +194,13 @@ impl Problem<'_> {
         if by_residual <= 0.0 || !patch.smooth {
             return 0.0;
         }
+        by_residual * self.agreement(fit, placed, contact, i, angle)
+    }
+
+    /// Robust weight of patch `i` by its normal alone, 0 to 1.
+    #[inline(always)]
+    pub fn agreement(&self, fit: &Fit, placed: &PlacedSurface, contact: &Contact, i: usize, angle: f64) -> f64 {
+        let patch = &self.patches.list[i];
         let facing = placed.turn(&patch.normal).dot(&contact.at.gradient) / contact.at.gradient.norm();
         let agreement = match (self.patches.cloud, fit.inside) {
             (true, _) => facing.abs(),
@@ -184,7 +209,7 @@ impl Problem<'_> {
         };
         let limit = angle + 3.0 * patch.sigma_normal;
         let by_normal = 1.0 - 2.0 * (1.0 - agreement) / (limit * limit); // the squared angle is 2·(1 − cosine)
-        by_residual * by_normal.clamp(0.0, 0.5) * 2.0
+        by_normal.clamp(0.0, 0.5) * 2.0
     }
 
     /// Runs `rounds` Gauss–Newton steps over every `stride`-th patch; `angle` is the tolerated angle between normals.
@@ -259,7 +284,8 @@ fn next_misfit(now: f64, across: &mut [f64], noise: f64) -> f64 {
 }
 
 impl Fit {
-    fn apply(&mut self, step: &Parameters) {
+    /// Adds a step of the fit, shortened where it goes too far.
+    pub fn apply(&mut self, step: &Parameters) {
         let shrink = |value: f64, share: f64, of: f64| value.clamp(-share * of, share * of);
         let mut step = *step;
         let reach = self.surface.radius.or(self.surface.cone.map(|c| c.apex * c.slope)).unwrap_or(1.0).abs();
