@@ -11,7 +11,7 @@ from siloscope import Camera, Estimate, SiloPose, sensors
 from siloscope.paper import metrics
 from siloscope.paper.scenarios import random_scene, scenario
 from siloscope.paper.stand_ins import IRREGULAR, real_silo
-from siloscope.scene import ASTRA_S, Feed, Scene, SensorModel, Silo, defects
+from siloscope.scene import ASTRA_S, Defects, Feed, Scene, SensorModel, Silo, defects
 from siloscope.sensors import SensorProfile
 from siloscope.surface import fit_depth, reasons
 
@@ -182,6 +182,45 @@ def test_stuck_feed_that_is_much_of_the_view_is_not_taken_for_the_wall(
     error = np.array([getattr(found.pose, k) - getattr(scene.pose, k) for k in ("r_x", "r_y", "t_x", "t_y")])
     assert np.all(np.abs(error) < 3.0 * np.sqrt(found.covariance.diagonal()))
     assert gap(found, scene) < 3.0
+
+
+FILMED = {
+    168: (
+        Feed("rathole+lumpy+tilted", 0.34146, seed=168),
+        ((1.8724, 2.5526, 0.0332), (1.8574, 2.9584, 0.0649)),
+        3,
+        4.6982,
+    ),
+    376: (
+        Feed("rathole+lumpy+tilted", 0.22652, seed=376),
+        ((0.3675, 1.2766, 0.0401), (2.5316, 3.5797, 0.0159), (3.2089, 3.4127, 0.0599)),
+        2,
+        4.1738,
+    ),
+}
+
+
+@pytest.mark.parametrize("seed", FILMED)
+def test_what_of_stuck_feed_goes_unnoticed_is_in_the_stated_deviation(seed: int) -> None:
+    feed, bands, lobes, azimuth = FILMED[seed]
+    stuck = Defects(film_bands=bands, film_lobes=lobes, film_azimuth=azimuth, seed=seed)
+    scene = replace(random_scene(seed, feed, sensor=ASTRA_S), defects=stuck)
+    found = fit(scene, "orbbec-astra-s").to_dict()
+    assert found["status"] == "ok"
+    truth = {**scene.silo.geometry.to_dict(), "t_x": scene.pose.t_x, "t_y": scene.pose.t_y}
+    stated = {**found["silo"], **found}
+    std = {**found["silo"]["std"], **found["std"]}
+    for name in (name for name in truth if stated[name] is not None):
+        assert abs(stated[name] - truth[name]) < 3.0 * std[name], name
+
+
+def test_stuck_feed_around_most_of_the_wall_is_left_step_by_step() -> None:
+    scene = random_scene(255, Feed("gaussian+tilted", 0.49124, seed=255), sensor=ASTRA_S)
+    bands = ((3.4563, 4.022, 0.01426), (0.02899, 0.69804, 0.04807), (3.3819, 4.1317, 0.0411))
+    uneven = Defects(dents=12, ovality=0.00431, ovality_azimuth=1.9722, film_bands=bands, film_azimuth=5.0235, seed=255)
+    found = fit(replace(scene, defects=uneven), "orbbec-astra-s")
+    assert found.pose is not None, found.message
+    assert gap(found, scene) < 2.0
 
 
 def test_an_auger_in_view_is_no_silo_seen_from_outside() -> None:

@@ -1,6 +1,6 @@
 //! From start values to a fit on patches that stands up to the evidence.
 
-use crate::outermost::outermost;
+use crate::outermost::{outermost, stuck};
 use crate::patches::{NONE, Patches};
 use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
@@ -120,7 +120,8 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
         wall = wall_patches(problem, &cone);
         fit = cone;
     }
-    let evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
+    let mut evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
+    evidence.stuck = stuck(problem, &fit, &wall);
     judge(&evidence, fit.inside, problem.patches.cloud)?;
     Ok(Settled { fit, wall, evidence })
 }

@@ -65,6 +65,11 @@ const MISFIT_FORM: f64 = 2.0;
 /// Misfit that chance alone shows on a smooth wall, metres.
 const CHANCE_MISFIT: f64 = 2e-4;
 
+/// Largest share of the wall that dents and seams put before it; where it is more, feed sticks to it.
+const DENTED: f64 = 0.06;
+/// How thick the feed is that sticks to such a wall unnoticed, metres.
+const FILM_FORM: f64 = 1e-3;
+
 /// How far the wall may lie off its mean over a block of tiles, metres.
 fn form(misfit: f64, oval: bool) -> f64 {
     MISFIT_FORM * (misfit - CHANCE_MISFIT).max(0.0) + if oval { WALL_FORM } else { 0.0 }
@@ -291,10 +296,14 @@ fn finish(
     let mut covariance = widened(problem, &model, &joint, (tiles, &pulls));
     let relief = if noise_is_known { relief(tiles) } else { relief_beside_noise(tiles) };
     let lasting = lasting_misfit(problem, fit.misfit, tiles);
-    covariance += relief_uncertainty(&joint, &fit, tiles, (relief, form(lasting, free[OVALITY])));
+    let form = form(lasting, free[OVALITY]);
+    let off_by = |form: f64| relief_uncertainty(&joint, &fit, tiles, (relief, form));
+    let film = if evidence.stuck > DENTED { off_by(form.max(FILM_FORM)) } else { Information::zeros() };
+    covariance += off_by(form);
     let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
     check_determined(&covariance, &placed, heights / tiles.len().max(1) as f64)?;
+    covariance += film; // it widens an answer, but takes none away
     let bias_is_free = free[7..OVALITY].contains(&true);
     let rays = if bias_is_free { some_rays(tiles, |patch| problem.patches.list[patch].q) } else { Vec::new() };
     let share = FrameShare::new((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free), (base, rays));

@@ -13,10 +13,14 @@ const FILM: f64 = 0.1;
 const FORM: f64 = 1.5e-3;
 /// What is off by more than so many standard deviations of noise and form is not on the surface.
 const SURE: f64 = 3.5;
+/// From fewer patches than this, which are no wall, it is led only once.
+const FEW: usize = 20;
 /// Least share of the wall's patches that lie behind a surface that is not the wall.
-const SHARE: f64 = 0.02;
+const SHARE: f64 = 0.01;
 /// Share of them that may be left behind the wall.
 const LEFT: f64 = 0.3;
+/// How often it is led further from where it came.
+const TRIES: usize = 3;
 /// Weight of what lies before the surface over that of what lies behind.
 const BEFORE: f64 = 0.05;
 /// Tolerated angle between normals, radians.
@@ -29,21 +33,38 @@ pub fn outermost(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Fit> {
     if problem.patches.common_noise != 1.0 || !fit.inside {
         return None; // a cloud, or noise that neighbouring pixels share: that puts patches behind a wall, too
     }
+    let on = wall.iter().filter(|wall| **wall).count();
     let now = behind(problem, fit, |i| fit.misfit > SMOOTH || !wall[i]);
-    if now < SHARE * wall.iter().filter(|wall| **wall).count() as f64 {
+    if now < SHARE * on as f64 {
         return None;
     }
-    let outer = led_outwards(&Problem { prior: &problem.prior.with_ovality(), ..*problem }, fit)?;
-    (behind(problem, &outer, |_| true) < LEFT * now).then_some(outer)
+    let prior = problem.prior.with_ovality();
+    let oval = Problem { prior: &prior, ..*problem };
+    let further = |from: &Fit| led_outwards(&oval, from);
+    let mut all = std::iter::successors(further(fit), |outer| further(outer)).take(if on < FEW { 1 } else { TRIES });
+    all.find(|outer| behind(problem, outer, |_| true) < LEFT * now)
 }
 
-/// How many patches run along the surface behind it, from every so many.
+/// Share of what runs along the wall that lies before it: feed sticks there, or dents.
+pub fn stuck(problem: &Problem, fit: &Fit, wall: &[bool]) -> f64 {
+    if problem.patches.common_noise != 1.0 || !fit.inside {
+        return 0.0;
+    }
+    let before = count(problem, fit, |i| !wall[i], |off| off < -SURE);
+    before / (before + wall.iter().filter(|wall| **wall).count() as f64)
+}
+
+/// How many patches run along the surface behind it.
 fn behind(problem: &Problem, fit: &Fit, asked: impl Fn(usize) -> bool) -> f64 {
-    const SKETCH: usize = 3;
-    let surely = |c: &Contact| c.residual > SURE * variance(c, fit, FORM).sqrt();
-    let asked = |i: usize| i.is_multiple_of(SKETCH) && asked(i);
-    let found = alongside(problem, fit, asked).filter(|(_, contact)| surely(contact)).count();
-    (SKETCH * found) as f64
+    count(problem, fit, asked, |off| off > SURE)
+}
+
+/// How many patches run along the surface where their distance behind it, in standard deviations, is as asked for.
+fn count(problem: &Problem, fit: &Fit, asked: impl Fn(usize) -> bool, is_there: impl Fn(f64) -> bool) -> f64 {
+    const SKETCH: usize = 3; // one patch in so many is asked
+    let off = |c: &Contact| c.residual / variance(c, fit, FORM).sqrt();
+    let some = alongside(problem, fit, |i| i.is_multiple_of(SKETCH) && asked(i));
+    (SKETCH * some.filter(|(_, contact)| is_there(off(contact))).count()) as f64
 }
 
 /// Variance of a residual by the noise and by a wall's form.

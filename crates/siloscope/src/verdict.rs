@@ -27,6 +27,8 @@ pub struct WallEvidence {
     pub arc: f64,
     /// Share of all patches that lie behind the wall, where nothing can be.
     pub behind: f64,
+    /// Share of what runs along the wall that lies before it.
+    pub stuck: f64,
 }
 
 /// Sums of a regression through the origin with noise-weighted pairs.
@@ -106,6 +108,7 @@ pub fn wall_evidence(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall:
         bend_std,
         arc: arc(seats.iter().flatten().map(|s| s.azimuth)),
         behind: behind(patches, fit, placed, wall),
+        stuck: 0.0,
     }
 }
 
