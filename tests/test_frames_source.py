@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import threading
 from pathlib import Path
 
 import numpy as np
@@ -60,6 +61,38 @@ def test_one_damaged_file_of_several_is_told_and_skipped(png: Path) -> None:
     assert len(source.problems) == 2
     assert "cut.png" in source.problems[0]
     assert "missing.png: no such file" in source.problems[1]
+
+
+@pytest.mark.parametrize("jobs", [2, 5])
+def test_frames_decoded_ahead_are_the_same_in_the_same_order(tmp_path: Path, jobs: int) -> None:
+    for number in range(40):
+        Image.fromarray(RAW + np.uint16(number)).save(tmp_path / f"{number:02}.png")
+    whole = (tmp_path / "17.png").read_bytes()
+    (tmp_path / "17.png").write_bytes(whole[:-400])
+    with siloscope.frames.open(tmp_path, depth_unit=0.001) as source:
+        alone, problems = list(source), source.problems
+        ahead = source.ahead(jobs)
+        assert len(ahead) == len(source) == 40
+        for _ in range(2):
+            found = list(ahead)
+            assert [frame.source for frame in found] == [frame.source for frame in alone]
+            assert all(np.array_equal(f.depth, a.depth) for f, a in zip(found, alone, strict=True))
+            assert source.problems == problems
+            assert "17.png" in problems[0]
+
+
+def test_frames_decoded_ahead_can_be_left_in_the_middle(png: Path) -> None:
+    source = siloscope.frames.open([png] * 30, depth_unit=0.001)
+    threads = threading.active_count()
+    frames = iter(source.ahead(3))
+    assert np.array_equal(next(frames).depth, RAW)
+    frames.close()
+    assert threading.active_count() == threads
+
+
+def test_a_missing_unit_is_asked_for_by_frames_decoded_ahead_too(png: Path) -> None:
+    with pytest.raises(InputError, match="--depth-unit"):
+        list(siloscope.frames.open([png] * 3).ahead(2))
 
 
 def test_nothing_readable_is_an_error(png: Path) -> None:

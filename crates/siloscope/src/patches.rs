@@ -45,8 +45,10 @@ pub struct TileRays {
     corners: [[f64; 2]; 4],
     /// Ray of the centre.
     centre: [f64; 2],
-    /// Change of the measured depth per pixel along the image's rows and columns.
+    /// Change of the measured depth per pixel along the image's rows and columns, over the tile and its neighbours.
     slopes: [f64; 2],
+    /// The same over the tile alone.
+    pub own_slopes: [f64; 2],
 }
 
 /// Places of two of a patch's eight neighbours.
@@ -216,9 +218,10 @@ impl Sums {
     }
 }
 
-/// Side of the tiles: about 80 of them across the image.
+/// Side of the tiles: about 80 of them across the image, or as few as 40 where they would be narrower than 8 pixels.
 pub fn tile_side(width: usize) -> usize {
-    ((width as f64 / 80.0).round() as usize).clamp(4, MAX_SIDE)
+    let across = |tiles: f64| (width as f64 / tiles).round() as usize;
+    across(80.0).max(across(40.0).min(8)).clamp(4, MAX_SIDE)
 }
 
 /// Largest side of a tile, pixels.
@@ -414,7 +417,7 @@ fn patch(
     let wide = pooled.plane()?;
     let (mu, mv) = (own.u / own.n, own.v / own.n);
     let z = depth;
-    let rays = TileRays::of(image, row * side * image.width + column * side, side, [wide.b, wide.c]);
+    let rays = TileRays::of(image, row * side * image.width + column * side, side, [wide, plane]);
     let steps = rays.steps(side);
     let [q_u, q_v] = &steps;
     let q = rays.mean() + q_u * mu + q_v * mv;
@@ -461,14 +464,16 @@ impl Patches {
 impl TileRays {
     /// Of the tile whose first pixel is `corner`.
     #[inline]
-    fn of(image: &DepthImage, corner: usize, side: usize, slopes: [f64; 2]) -> Self {
+    fn of(image: &DepthImage, corner: usize, side: usize, planes: [Plane; 2]) -> Self {
         let last = side - 1;
         let at = |u: usize, v: usize| image.rays[corner + v * image.width + u];
+        let [slopes, own_slopes] = planes.map(|plane| [plane.b, plane.c]);
         let (p, q) = (at(last / 2, last / 2), at(last.div_ceil(2), last.div_ceil(2)));
         Self {
             corners: [at(0, 0), at(last, 0), at(0, last), at(last, last)],
             centre: [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])],
             slopes,
+            own_slopes,
         }
     }
 

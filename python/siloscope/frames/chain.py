@@ -22,6 +22,7 @@ class Chain(FrameSource):
         self.provenance = {"format": "several", "files": [source.provenance for source in sources]}
         self.file_camera = _shared([source.camera for source in sources])
         self.file_depth_unit = _shared([source.depth_unit for source in sources])
+        self.independent = all(source.independent for source in sources)
 
     def _items(self) -> Iterator[Item]:
         for source in self.sources:

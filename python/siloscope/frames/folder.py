@@ -33,6 +33,8 @@ _ALONE = Options(beside=False)
 class FolderSource(FrameSource):
     """Files of one format with a frame each."""
 
+    independent = True
+
     def __init__(self, path: Path, options: Options, files: Sequence[Path], format: Format, layout: str) -> None:
         super().__init__(path, "folder", options)
         self.files = tuple(files)

@@ -49,6 +49,8 @@ def read(path: Path) -> Frame:
 class PngSource(FrameSource):
     """One PNG."""
 
+    independent = True
+
     def __init__(self, path: Path, options: Options) -> None:
         super().__init__(path, "png", options)
         with path.open("rb") as file:

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Callable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -119,7 +121,11 @@ class FrameSource(ABC):
         What is known about the origin: device, serial number, stream, where camera and unit come from.
     problems : list of str
         What could not be read in the iteration so far: ``frame 17: truncated PNG``.
+    independent : bool
+        Whether frames can be decoded at the same time, as each has a file of its own.
     """
+
+    independent = False
 
     def __init__(self, path: Path, format: str, options: Options) -> None:
         self.path = path
@@ -176,9 +182,19 @@ class FrameSource(ABC):
         return True
 
     def __iter__(self) -> Iterator[Frame]:
+        return self._frames(1)
+
+    def ahead(self, jobs: int) -> Ahead:
+        """The frames in the same order; the next ones are decoded by so many threads while one is being used."""
+        return Ahead(self, jobs)
+
+    def _frames(self, jobs: int) -> Iterator[Frame]:
         self.problems = []
         read = 0
-        for frame in self._readable():
+        for item, frame in self._decoded(jobs):
+            if isinstance(frame, InputError):
+                self.problems.append(_told(item.label, frame))
+                continue
             read += 1
             yield frame
         if not read:
@@ -191,16 +207,31 @@ class FrameSource(ABC):
             raise IndexError(f"{self.name}: no frame {index}")
         return self._finished(item)
 
-    def _readable(self) -> Iterator[Frame]:
-        for item in self._items_before_damage():
-            try:
-                frame = self._finished(item)
-            except UnknownUnit:
-                raise
-            except InputError as error:
-                self.problems.append(_told(item.label, error))
-                continue
-            yield frame
+    def _decoded(self, jobs: int) -> Iterator[tuple[Item, Frame | InputError]]:
+        """The items in order, each with its frame or what is wrong with it."""
+        items = self._items_before_damage()
+        if jobs == 1 or not self.independent:
+            yield from ((item, self._attempt(item)) for item in items)
+            return
+        waiting: deque[tuple[Item, Future[Frame | InputError]]] = deque()
+        pool = ThreadPoolExecutor(jobs)
+        try:
+            for item in items:
+                waiting.append((item, pool.submit(self._attempt, item)))
+                if len(waiting) > 2 * jobs:
+                    item, frame = waiting.popleft()
+                    yield item, frame.result()
+            yield from ((item, frame.result()) for item, frame in waiting)
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+    def _attempt(self, item: Item) -> Frame | InputError:
+        try:
+            return self._finished(item)
+        except UnknownUnit:
+            raise
+        except InputError as error:
+            return error
 
     def _items_before_damage(self) -> Iterator[Item]:
         try:
@@ -272,6 +303,23 @@ class FrameSource(ABC):
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+class Ahead:
+    """What `FrameSource.ahead` gives: the source's frames, to be gone through once or several times."""
+
+    def __init__(self, source: FrameSource, jobs: int) -> None:
+        self.source = source
+        self.jobs = jobs
+
+    def __len__(self) -> int:
+        return len(self.source)
+
+    def __bool__(self) -> bool:
+        return True
+
+    def __iter__(self) -> Iterator[Frame]:
+        return self.source._frames(self.jobs)
 
 
 def _told(label: str, error: InputError) -> str:
