@@ -20,6 +20,8 @@ from siloscope.scene import ASTRA_S, Defects, Feed, Scene, defects, discharge
 SHAPES = ("gaussian", "funnel", "mound", "gaussian+tilted", "rathole+lumpy+tilted")
 QUANTITIES = ("r_x", "r_y", "t_x", "t_y", "radius", "cylinder_bottom", "apex")
 WALLS = "seams,dents,oval,ladder,cables"
+LONG = 40
+"""Frames of a long sequence, in which what frames share shows."""
 
 
 def scene_of(seed: int, wall: Defects | None = None) -> Scene:
@@ -68,8 +70,24 @@ def sequence_of_real_wall(knowledge: Knowledge, seed: int) -> tuple[Calibration,
     return _calibrated(knowledge, scene_of(seed, defects(WALLS, seed)))
 
 
-def _calibrated(knowledge: Knowledge, scene: Scene) -> tuple[Calibration, Scene]:
-    answers = [knowledge.locate(step.render()) for step in discharge(scene, 6, 0.55, 0.05)]
+def long_sequence(knowledge: Knowledge, seed: int) -> tuple[Calibration, Scene]:
+    """The calibration from 40 frames of a discharge."""
+    return _calibrated(knowledge, scene_of(seed), LONG)
+
+
+def long_sequence_of_dents(knowledge: Knowledge, seed: int) -> tuple[Calibration, Scene]:
+    """The same in a round silo with dents: what they do comes back in every frame."""
+    return _calibrated(knowledge, scene_of(seed, defects("dents", seed)), LONG)
+
+
+def long_sequence_of_warped_sensor(knowledge: Knowledge, seed: int) -> tuple[Calibration, Scene]:
+    """The same with a lasting warp of the sensor that no profile knows, 1 mm at 1 m."""
+    scene = scene_of(seed)
+    return _calibrated(knowledge, replace(scene, sensor=replace(ASTRA_S, warp=0.001, warp_seed=seed)), LONG)
+
+
+def _calibrated(knowledge: Knowledge, scene: Scene, steps: int = 6) -> tuple[Calibration, Scene]:
+    answers = [knowledge.locate(step.render()) for step in discharge(scene, steps, 0.55, 0.05)]
     return siloscope.calibrate(answers), scene
 
 
@@ -82,6 +100,10 @@ ROWS = (
     Row("calibrated from 6, diameter known", DIAMETER, sequence),
     Row("calibrated from 6, nothing known", NOTHING, sequence),
     Row("calibrated from 6, real wall, profile known", KNOWN, sequence_of_real_wall),
+    Row("calibrated from 40, profile known", KNOWN, long_sequence),
+    Row("calibrated from 40, nothing known", NOTHING, long_sequence),
+    Row("calibrated from 40, dents, profile known", KNOWN, long_sequence_of_dents),
+    Row("calibrated from 40, warped sensor, profile known", KNOWN, long_sequence_of_warped_sensor),
 )
 
 

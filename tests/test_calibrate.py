@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, calibrate, locate, sensors
+from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, _core, calibrate, locate, sensors
 from siloscope.cli import main
 from siloscope.fusion import Stack
 from siloscope.paper.scenarios import random_scene, scenario
@@ -128,6 +128,25 @@ def test_a_known_sensor_needs_no_second_look() -> None:
     stack = Stack([e.evidence for e in sequence() if e.evidence])
     assert straightened(stack) is stack
     assert stack.rays.size == 0
+
+
+def test_the_view_from_elsewhere_takes_any_layout_and_refuses_arrays_that_do_not_belong_together() -> None:
+    stack = Stack([e.evidence for e in sequence(sensor=None) if e.evidence])
+    near = 1e-6 * stack.free
+    given = (stack.base, stack.rays, stack.free, stack.base + near)
+    steps, turns = _core.surface_seen_from(*given)
+    np.testing.assert_allclose(steps, near, rtol=1e-2, atol=1e-9)
+    for layout in (np.asfortranarray, lambda a: np.repeat(a, 2, axis=0)[::2]):
+        again = _core.surface_seen_from(*(layout(array) for array in given))
+        np.testing.assert_array_equal(again[0], steps)
+        np.testing.assert_array_equal(again[1], turns)
+    assert _core.surface_seen_from(*(array[:0] for array in given))[1].shape == (0, 12, 12)
+    nowhere = _core.surface_seen_from(stack.base, stack.rays, stack.free, np.full_like(stack.base, np.nan))
+    assert np.isfinite(nowhere[0]).all()
+    for k in range(4):
+        wrong = [array[1:] if number == k else array for number, array in enumerate(given)]
+        with pytest.raises(ValueError, match="shapes"):
+            _core.surface_seen_from(*wrong)
 
 
 def test_evidence_from_before_frames_kept_their_rays_is_still_used(tmp_path: Path) -> None:
