@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields
 from numbers import Real
 from typing import Any
 
@@ -81,7 +81,8 @@ class Camera:
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data with the fields' names, as in our TOML and JSON camera files."""
-        return {**asdict(self), "distortion": list(self.distortion)}
+        plain = {field.name: getattr(self, field.name) for field in fields(self)}
+        return {**plain, "distortion": list(self.distortion)}
 
 
 def is_number(value: Any) -> bool:
