@@ -1,6 +1,6 @@
 //! From start values to a fit on patches that stands up to the evidence.
 
-use crate::outermost::{outermost, stuck};
+use crate::outermost::{left_behind, outermost, stuck};
 use crate::patches::{NONE, Patches};
 use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
@@ -123,8 +123,14 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
     let mut evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
     evidence.stuck = stuck(problem, &fit, &wall);
     judge(&evidence, fit.inside, problem.patches.cloud)?;
+    if left_behind(problem, &fit, &wall) > MOST_LEFT {
+        return Err(Refusal::BehindWall);
+    }
     Ok(Settled { fit, wall, evidence })
 }
+
+/// Most patches that may run along the wall behind it, as a share of its own.
+const MOST_LEFT: f64 = 0.05;
 
 /// Whether the cone could as well be feed.
 pub(crate) fn may_be_feed(problem: &Problem, fit: &Fit) -> bool {
