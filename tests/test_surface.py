@@ -226,7 +226,8 @@ def test_stuck_feed_around_most_of_the_wall_is_left_step_by_step() -> None:
 def test_a_surface_with_wall_left_behind_it_is_refused() -> None:
     scene = random_scene(652, Feed("gaussian+tilted", 0.04091, seed=652), sensor=ASTRA_S)
     bands = ((1.83846, 2.38083, 0.05822),)
-    uneven = Defects(dents=12, ovality=0.00706, ovality_azimuth=0.50373, film_bands=bands, film_azimuth=0.69764, seed=652)
+    oval = Defects(dents=12, ovality=0.00706, ovality_azimuth=0.50373, seed=652)
+    uneven = replace(oval, film_bands=bands, film_azimuth=0.69764)
     assert fit(replace(scene, defects=uneven), "orbbec-astra-s").reason == "behind-wall"
 
 
