@@ -223,14 +223,6 @@ def test_stuck_feed_around_most_of_the_wall_is_left_step_by_step() -> None:
     assert gap(found, scene) < 2.0
 
 
-def test_a_surface_with_wall_left_behind_it_is_refused() -> None:
-    scene = random_scene(652, Feed("gaussian+tilted", 0.04091, seed=652), sensor=ASTRA_S)
-    bands = ((1.83846, 2.38083, 0.05822),)
-    oval = Defects(dents=12, ovality=0.00706, ovality_azimuth=0.50373, seed=652)
-    uneven = replace(oval, film_bands=bands, film_azimuth=0.69764)
-    assert fit(replace(scene, defects=uneven), "orbbec-astra-s").reason == "behind-wall"
-
-
 def test_an_auger_in_view_is_no_silo_seen_from_outside() -> None:
     scene = in_use(1056, "funnel", 0.2966, "film,auger,dents,oval")
     assert fit(scene, "orbbec-astra-s").status == "refused"

@@ -1,6 +1,6 @@
 //! From start values to a fit on patches that stands up to the evidence.
 
-use crate::outermost::{left_behind, outermost, stuck};
+use crate::outermost::{outermost, stuck};
 use crate::patches::{NONE, Patches};
 use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
@@ -123,16 +123,8 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
     let mut evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
     evidence.stuck = stuck(problem, &fit, &wall);
     judge(&evidence, fit.inside, problem.patches.cloud)?;
-    let is_held = problem.prior.bias_std[2] > 0.0 || problem.prior.gravity.is_some();
-    if !is_held && left_behind(problem, &fit, &wall) > MOST_LEFT {
-        return Err(Refusal::BehindWall);
-    }
     Ok(Settled { fit, wall, evidence })
 }
-
-/// Most patches that may run along the wall behind it, as a share of its own; unless the depth's unknown bend, or a
-/// direction that was told, holds the wall where it does not fit.
-const MOST_LEFT: f64 = 0.05;
 
 /// Whether the cone could as well be feed.
 pub(crate) fn may_be_feed(problem: &Problem, fit: &Fit) -> bool {

@@ -30,8 +30,8 @@ const SMOOTH: f64 = 1e-3;
 
 /// A surface further out, oval where the silo is, if patches lie behind this one and hardly any behind that.
 pub fn outermost(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Fit> {
-    if !is_asked(problem, fit) {
-        return None;
+    if problem.patches.common_noise != 1.0 || !fit.inside {
+        return None; // a cloud, or noise that neighbouring pixels share: that puts patches behind a wall, too
     }
     let on = wall.iter().filter(|wall| **wall).count();
     let now = behind(problem, fit, |i| fit.misfit > SMOOTH || !wall[i]);
@@ -45,27 +45,13 @@ pub fn outermost(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Fit> {
     all.find(|outer| behind(problem, outer, |_| true) < LEFT * now)
 }
 
-/// Not of a cloud, nor where neighbouring pixels share their noise: that puts patches behind a wall, too.
-fn is_asked(problem: &Problem, fit: &Fit) -> bool {
-    problem.patches.common_noise == 1.0 && fit.inside
-}
-
 /// Share of what runs along the wall that lies before it: feed sticks there, or dents.
 pub fn stuck(problem: &Problem, fit: &Fit, wall: &[bool]) -> f64 {
-    if !is_asked(problem, fit) {
+    if problem.patches.common_noise != 1.0 || !fit.inside {
         return 0.0;
     }
     let before = count(problem, fit, |i| !wall[i], |off| off < -SURE);
     before / (before + wall.iter().filter(|wall| **wall).count() as f64)
-}
-
-/// Patches that run along the wall behind it, as a share of the wall's: where they are many, it could not be led outwards.
-pub fn left_behind(problem: &Problem, fit: &Fit, wall: &[bool]) -> f64 {
-    if !is_asked(problem, fit) {
-        return 0.0;
-    }
-    let on = wall.iter().filter(|wall| **wall).count();
-    behind(problem, fit, |_| true) / on.max(1) as f64
 }
 
 /// How many patches run along the surface behind it.
