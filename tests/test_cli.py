@@ -153,6 +153,17 @@ def test_an_interruption_is_told_like_every_error(tmp_path: Path) -> None:
     assert json.loads(out)["error"] == "interrupted"
 
 
+def test_an_interruption_while_a_module_is_imported_ends_with_the_same_code(tmp_path: Path) -> None:
+    (tmp_path / "interrupted.py").write_text(
+        "import sys\n"
+        "from siloscope.cli import outcome\n"
+        "sys.exit(outcome.guarded(lambda: exec('raise KeyboardInterrupt'), []))\n"
+    )
+    words = [sys.executable, "-m", "interrupted"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (outcome.INTERRUPTED, "error: interrupted\n")
+
+
 def test_no_command_is_listed_twice() -> None:
     assert len({command.name for command in COMMANDS}) == len(COMMANDS)
 

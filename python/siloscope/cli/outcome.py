@@ -42,6 +42,7 @@ def guarded(run: Callable[[], Any], arguments: Sequence[str]) -> int:
     except SystemExit as ended:  # shell completion ends so, and rich, with code 1, where it finds the pipe closed
         return BROKEN_PIPE if ended.code == 1 else int(ended.code or 0)
     except (KeyboardInterrupt, typer.Abort):
+        _forget_where_it_was()
         return _report("interrupted", "interrupted", INTERRUPTED, as_json)
     except SiloscopeError as error:
         return _report(_kind(error), str(error), error.exit_code, as_json)
@@ -53,6 +54,15 @@ def guarded(run: Callable[[], Any], arguments: Sequence[str]) -> int:
         return _report("input", _file_sentence(error), 3, as_json)
     except Exception as error:
         return _report("unexpected", _unexpected_sentence(error), 1, as_json)
+
+
+def _forget_where_it_was() -> None:
+    """Lets the process end with its own exit code.
+
+    Where an interruption comes inside an ``exec``, as dataclasses need when a module is imported, ``python -m`` ends by
+    the signal although it was caught. The next ``exec`` makes it forget that.
+    """
+    exec("")
 
 
 def print_json(document: Any) -> None:
