@@ -21,12 +21,17 @@ const SHARE: f64 = 0.01;
 const LEFT: f64 = 0.3;
 /// How often it is led further from where it came.
 const TRIES: usize = 3;
+/// What is left of them after a try from which another is not worth it.
+const SLOW: f64 = 0.95;
 /// Weight of what lies before the surface over that of what lies behind.
 const BEFORE: f64 = 0.05;
 /// Tolerated angle between normals, radians.
 const ANGLE: f64 = 0.15;
 /// Misfit of a wall with nothing behind it, metres: only with a larger one may patches of the wall itself lie behind it.
 const SMOOTH: f64 = 1e-3;
+
+/// One patch in so many is asked.
+const SKETCH: usize = 3;
 
 /// A surface further out, oval where the silo is, if patches lie behind this one and hardly any behind that.
 pub fn outermost(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Fit> {
@@ -40,9 +45,15 @@ pub fn outermost(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Fit> {
     }
     let prior = problem.prior.with_ovality();
     let oval = Problem { prior: &prior, ..*problem };
-    let further = |from: &Fit| led_outwards(&oval, from);
-    let mut all = std::iter::successors(further(fit), |outer| further(outer)).take(if on < FEW { 1 } else { TRIES });
-    all.find(|outer| behind(problem, outer, |_| true) < LEFT * now)
+    let (mut outer, mut before) = (led_outwards(&oval, fit)?, now);
+    for _ in 1..if on < FEW { 1 } else { TRIES } {
+        let left = behind(problem, &outer, |_| true);
+        if left < LEFT * now || left > SLOW * before {
+            break;
+        }
+        (outer, before) = (led_outwards(&oval, &outer)?, left);
+    }
+    (behind(problem, &outer, |_| true) < LEFT * now).then_some(outer)
 }
 
 /// Share of what runs along the wall that lies before it: feed sticks there, or dents.
@@ -61,7 +72,6 @@ fn behind(problem: &Problem, fit: &Fit, asked: impl Fn(usize) -> bool) -> f64 {
 
 /// How many patches run along the surface where their distance behind it, in standard deviations, is as asked for.
 fn count(problem: &Problem, fit: &Fit, asked: impl Fn(usize) -> bool, is_there: impl Fn(f64) -> bool) -> f64 {
-    const SKETCH: usize = 3; // one patch in so many is asked
     let off = |c: &Contact| c.residual / variance(c, fit, FORM).sqrt();
     let some = alongside(problem, fit, |i| i.is_multiple_of(SKETCH) && asked(i));
     (SKETCH * some.filter(|(_, contact)| is_there(off(contact))).count()) as f64
@@ -99,7 +109,7 @@ fn led_outwards(problem: &Problem, fit: &Fit) -> Option<Fit> {
     for _ in 0..ROUNDS {
         let placed = PlacedSurface::new(outer.surface);
         let mut system = System::with_prior(problem.prior, &outer);
-        for (i, contact) in alongside(problem, &outer, |_| true) {
+        for (i, contact) in alongside(problem, &outer, |i| i.is_multiple_of(SKETCH)) {
             let variance = variance(&contact, &outer, form);
             let off = contact.residual / variance.sqrt();
             let weight = if off > 0.0 { 1.0 / off.max(1.0) } else { BEFORE * tukey(off * off) };
