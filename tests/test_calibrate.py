@@ -115,12 +115,12 @@ def test_frames_that_leave_a_bent_valley_open_meet_where_their_valleys_do(
 
 
 def test_frames_agree_once_their_equations_are_made_about_the_common_answer() -> None:
-    _, frames = unseen(1021, "funnel", False)
+    _, frames = unseen(2018, "gaussian+tilted", False)
     found = calibrate(frames)
     assert found.parameters is not None
     alone = Stack([e.evidence for e in frames if e.evidence])
     furthest = [np.sqrt(s.distances(found.parameters[None])[0] / s.dof).max() for s in (alone, straightened(alone))]
-    assert furthest[0] > 5.0  # else there was nothing to straighten
+    assert furthest[0] > 10.0
     assert furthest[1] < 2.0
 
 
