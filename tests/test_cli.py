@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -141,6 +142,15 @@ def test_streams_that_nobody_reads_cost_no_traceback(line: str, code: int) -> No
     assert not done.stdout or json.loads(done.stdout)["exit_code"] == code
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """Where the tests run in the background, interruptions are ignored, here and in every process started from here."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_an_interruption_is_told_like_every_error(tmp_path: Path) -> None:
     arguments = ["simulate", "--steps", "100000", "--out", str(tmp_path / "frames"), "--json"]
     words = [sys.executable, "-m", "siloscope", *arguments]
@@ -148,7 +158,10 @@ def test_an_interruption_is_told_like_every_error(tmp_path: Path) -> None:
         while running.poll() is None and not (tmp_path / "frames").exists():
             time.sleep(0.01)
         running.send_signal(signal.SIGINT)
-        out, err = running.communicate()
+        try:
+            out, err = running.communicate(timeout=60)
+        finally:
+            running.kill()
     assert (running.returncode, err) == (outcome.INTERRUPTED, "error: interrupted\n")
     assert json.loads(out)["error"] == "interrupted"
 
