@@ -11,7 +11,7 @@ use siloscope::patches::DepthImage;
 use siloscope::refusal::Refusal;
 use siloscope::sensor::{DepthBias, DepthError, NoiseLaw};
 use siloscope::share::FrameShare;
-use siloscope::straight::{Ray, Straight};
+use siloscope::straight::{Ray, seen_from};
 use siloscope::surface::{Cone, Information, PARAMETERS, Parameters, SiloSurface};
 use siloscope::workers::Workers;
 use siloscope::{SiloPose, Vec3};
@@ -218,14 +218,8 @@ fn surface_seen_from<'py>(
     let seen: Vec<(Parameters, Information)> = py.detach(|| {
         let frame = |n: usize| {
             let (base, place) = (vector(bases.row(n)), vector(places.row(n)));
-            let of_frame: Vec<Ray> = rays
-                .outer_iter()
-                .nth(n)
-                .map_or(Vec::new(), |r| r.outer_iter().map(|ray| [ray[0], ray[1], ray[2]]).collect());
-            let gap = (place - base).map(|v| if v.is_finite() { v } else { 0.0 });
-            let free = std::array::from_fn(|k| free[(n, k)]);
-            Straight::new(&base, &of_frame, free)
-                .map_or((gap, Information::identity()), |frame| frame.seen_from(&place))
+            let of_frame: Vec<Ray> = (0..rays.shape()[1]).map(|k| [0, 1, 2].map(|c| rays[(n, k, c)])).collect();
+            seen_from(&base, &of_frame, std::array::from_fn(|k| free[(n, k)]), &place)
         };
         (0..count).map(frame).collect()
     });

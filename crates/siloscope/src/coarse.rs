@@ -1,6 +1,6 @@
 //! From start values to a fit on patches that stands up to the evidence.
 
-use crate::outermost::{outermost, stuck};
+use crate::outermost::{FILM, outermost, stuck};
 use crate::patches::{NONE, Patches};
 use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
@@ -123,6 +123,7 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
     let mut evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
     evidence.stuck = stuck(problem, &fit, &wall);
     judge(&evidence, fit.inside, problem.patches.cloud)?;
+    drop_bare_parts(problem, &mut fit, &wall);
     Ok(Settled { fit, wall, evidence })
 }
 
@@ -218,7 +219,7 @@ pub(crate) fn likelihood(problem: &Problem, fit: &Fit) -> f64 {
 }
 
 /// Leaves out a part of which hardly any wall patch is left: its parameters would be undetermined.
-pub fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
+fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
     const ENOUGH: usize = 12;
     let placed = PlacedSurface::new(fit.surface);
     let (mut cylinder, mut cone) = (0, 0);
@@ -239,7 +240,6 @@ pub fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
 pub fn drop_film(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
     const SKETCH: usize = 3;
     const SURE: f64 = 5.0;
-    const FILM: f64 = 0.1; // thicker than any film, as a share of the silo's size
     const SHARE: f64 = 0.2;
     if problem.patches.cloud || !fit.inside || fit.surface.radius.is_none() || fit.surface.cone.is_none() {
         return;

@@ -3,7 +3,7 @@
 use crate::Result;
 use crate::Vec3;
 use crate::cloud::cloud_patches;
-use crate::coarse::{Settled, coarse_fit, drop_bare_parts, drop_film, may_be_feed};
+use crate::coarse::{Settled, coarse_fit, drop_film, may_be_feed};
 use crate::covariance::{
     lasting_misfit, relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened,
 };
@@ -123,7 +123,6 @@ fn measured(
     if let (Some((radius, _)), true) = (know.radius, prior.bias_std[1] > 0.0) {
         fit.rescale_to(radius);
     }
-    drop_bare_parts(&problem, &mut fit, &wall);
     drop_film(&problem, &mut fit, &wall);
     known.drop_parts_without(&fit.surface);
     let (noise, mut equations) = on_pixels(problem, image, &mut fit, &wall, know.error.noise, looks);
@@ -229,10 +228,9 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
         Err(refusal) => return Ok(Err(refusal)),
     };
     let known = KnownWall::of(&found);
-    let Settled { mut fit, wall, evidence } = found;
+    let Settled { fit, wall, evidence } = found;
     clock.lap("coarse fit");
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
-    drop_bare_parts(&problem, &mut fit, &wall);
     let mut equations = patch_equations(&problem, &fit, &wall);
     let mut result = match finish(&problem, fit, &mut equations, (evidence, known), false) {
         Ok(found) => found,

@@ -8,7 +8,7 @@ use crate::refine::{Contact, Equation, Fit, Problem, System, tukey};
 use crate::surface::PlacedSurface;
 
 /// Thicker than any film, as a share of the silo's size.
-const FILM: f64 = 0.1;
+pub const FILM: f64 = 0.1;
 /// How far dents and seams put a tile off the ideal wall, metres.
 const FORM: f64 = 1.5e-3;
 /// What is off by more than so many standard deviations of noise and form is not on the surface.
@@ -35,8 +35,8 @@ const SKETCH: usize = 3;
 
 /// A surface further out, oval where the silo is, if patches lie behind this one and hardly any behind that.
 pub fn outermost(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Fit> {
-    if problem.patches.common_noise != 1.0 || !fit.inside {
-        return None; // a cloud, or noise that neighbouring pixels share: that puts patches behind a wall, too
+    if !sides_tell(problem, fit) {
+        return None;
     }
     let on = wall.iter().filter(|wall| **wall).count();
     let now = behind(problem, fit, |i| fit.misfit > SMOOTH || !wall[i]);
@@ -45,8 +45,9 @@ pub fn outermost(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Fit> {
     }
     let prior = problem.prior.with_ovality();
     let oval = Problem { prior: &prior, ..*problem };
+    let tries = if on < FEW { 1 } else { TRIES };
     let (mut outer, mut before) = (led_outwards(&oval, fit)?, now);
-    for _ in 1..if on < FEW { 1 } else { TRIES } {
+    for _ in 1..tries {
         let left = behind(problem, &outer, |_| true);
         if left < LEFT * now || left > SLOW * before {
             break;
@@ -56,9 +57,15 @@ pub fn outermost(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Fit> {
     (behind(problem, &outer, |_| true) < LEFT * now).then_some(outer)
 }
 
+/// Whether it means anything on which side of the surface a patch lies: not of a cloud, nor where neighbouring pixels
+/// share their noise, which puts patches behind a wall, too.
+fn sides_tell(problem: &Problem, fit: &Fit) -> bool {
+    problem.patches.common_noise == 1.0 && fit.inside
+}
+
 /// Share of what runs along the wall that lies before it: feed sticks there, or dents.
 pub fn stuck(problem: &Problem, fit: &Fit, wall: &[bool]) -> f64 {
-    if problem.patches.common_noise != 1.0 || !fit.inside {
+    if !sides_tell(problem, fit) {
         return 0.0;
     }
     let before = count(problem, fit, |i| !wall[i], |off| off < -SURE);

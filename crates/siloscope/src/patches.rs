@@ -557,3 +557,16 @@ pub fn noise_from_scatter(samples: &mut [(f64, f64)], floor: f64) -> NoiseLaw {
         power: 1.0,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_of_small_images_stay_wide_enough_for_a_plane() {
+        let sides = [[80, 4], [160, 4], [224, 6], [320, 8], [512, 8], [640, 8], [1024, 13], [4096, MAX_SIDE]];
+        for [width, side] in sides {
+            assert_eq!(tile_side(width), side, "{width}");
+        }
+    }
+}

@@ -97,7 +97,7 @@ impl Place {
 const GRAZING: f64 = 0.02;
 
 /// A frame's rays at the base of its equations.
-pub struct Straight {
+struct Straight {
     base: Parameters,
     /// Ray, part, reading and its derivative.
     rays: Vec<(Ray, Part, f64, Parameters)>,
@@ -136,7 +136,7 @@ impl Straight {
     /// told by no ray is as far from the base as it is, and so is what a ray tells that misses the wall at θ.
     pub fn seen_from(&self, place: &Parameters) -> (Parameters, Information) {
         let there = Place::new(place);
-        let gap = (place - self.base).map(|v| if v.is_finite() { v } else { 0.0 });
+        let gap = finite(place - self.base);
         let (mut step, mut turn) = (Parameters::zeros(), Information::zeros());
         for (ray, part, reading, row) in &self.rays {
             let (change, slope) = match there.reading(ray, *part) {
@@ -160,6 +160,24 @@ impl Straight {
     fn solved(&self, right: Parameters) -> Parameters {
         self.normal.solve(&right)
     }
+}
+
+/// What of a frame's equations, made at `base` with `rays`, predicts the readings at `place`: the step from the base and
+/// its derivative. Without rays that tell anything the equations hold as they are: the step is the distance.
+pub fn seen_from(
+    base: &Parameters,
+    rays: &[Ray],
+    free: [bool; PARAMETERS],
+    place: &Parameters,
+) -> (Parameters, Information) {
+    match Straight::new(base, rays, free) {
+        Some(frame) => frame.seen_from(place),
+        None => (finite(place - base), Information::identity()),
+    }
+}
+
+fn finite(values: Parameters) -> Parameters {
+    values.map(|v| if v.is_finite() { v } else { 0.0 })
 }
 
 #[cfg(test)]
