@@ -12,7 +12,6 @@ import numpy as np
 from benchmarks import trials
 from benchmarks.trials import DIAMETER, KNOWN, NOTHING, Knowledge
 
-import siloscope
 from siloscope import Calibration, Estimate
 from siloscope.paper.scenarios import random_scene
 from siloscope.scene import ASTRA_S, Defects, Feed, Scene, defects, discharge
@@ -87,8 +86,7 @@ def long_sequence_of_warped_sensor(knowledge: Knowledge, seed: int) -> tuple[Cal
 
 
 def _calibrated(knowledge: Knowledge, scene: Scene, steps: int = 6) -> tuple[Calibration, Scene]:
-    answers = [knowledge.locate(step.render()) for step in discharge(scene, steps, 0.55, 0.05)]
-    return siloscope.calibrate(answers), scene
+    return knowledge.calibrate(list(discharge(scene, steps, 0.55, 0.05))), scene
 
 
 ROWS = (

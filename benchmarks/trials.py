@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
 import siloscope
-from siloscope import Estimate
+from siloscope import Calibration, Estimate
 from siloscope.paper import metrics
 from siloscope.paper.scenarios import random_big_scene, random_scene, scenario
 from siloscope.scene import ASTRA_S, PERFECT, Feed, Scene, SimulatedFrame
@@ -43,8 +43,14 @@ class Knowledge:
 
     def locate(self, frame: SimulatedFrame) -> Estimate:
         """The answer for a simulated frame."""
-        diameter = 2.0 * frame.scene.silo.radius if self.diameter else None
-        return siloscope.locate(frame.frame(), sensor=self.profile, diameter=diameter)
+        return siloscope.locate(frame.frame(), **self._of(frame.scene))
+
+    def calibrate(self, scenes: Sequence[Scene]) -> Calibration:
+        """The calibration from simulated frames of one camera in one silo, one frame of each scene."""
+        return siloscope.calibrate((scene.render().frame() for scene in scenes), **self._of(scenes[0]))
+
+    def _of(self, scene: Scene) -> dict[str, Any]:
+        return {"sensor": self.profile, "diameter": 2.0 * scene.silo.radius if self.diameter else None}
 
 
 KNOWN = Knowledge("profile known", "orbbec-astra-s")

@@ -15,7 +15,7 @@ import pytest
 
 from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, _core, calibrate, locate, sensors
 from siloscope.cli import main
-from siloscope.fusion import Stack
+from siloscope.fusion import LENGTHS, SCALE, Stack
 from siloscope.paper.scenarios import random_scene, scenario
 from siloscope.scene import ASTRA_S, Feed, Scene, discharge
 from siloscope.straight import straightened
@@ -91,6 +91,31 @@ def test_the_same_frame_many_times_is_no_surer_where_frames_share_their_error() 
     assert many.silo_std.apex is not None
     assert many.silo_std.apex > 0.9 * one.silo_std.apex  # the scale is not known, however many frames there are
     assert stds(many)[0] < 0.9 * stds(one)[0]
+
+
+@pytest.mark.parametrize("sensor", ["orbbec-astra-s", None])
+def test_distances_are_the_quadratic_forms_of_the_gaps(sensor: str | None) -> None:
+    evidence = [e.evidence for e in sequence(sensor=sensor) if e.evidence]
+    cone = np.isin(np.arange(12), [5, 6])
+    blind = replace(
+        evidence[0], parameters=np.where(cone, np.nan, evidence[0].parameters), free=evidence[0].free & ~cone
+    )
+    stack = Stack([blind, *evidence[1:]])
+    draw = np.random.default_rng(4)
+    centres = np.nan_to_num(stack.answers[[0, 3, 5, 7, 7, 7]]) + draw.normal(0.0, 1e-3, (6, 12))
+    centres[:, SCALE] = stack.answers[0, SCALE] + np.array([0.0, 0.0, 0.0, 0.0, 0.01, 0.0])
+    centres[5, 5:7] = np.nan  # one that has no cone
+
+    def distance(centre: np.ndarray, frame: int) -> float:
+        gap = np.nan_to_num(stack.answers[frame] - centre)  # what either has not seen does not part them
+        if not stack.free[frame, SCALE]:
+            gap[list(LENGTHS)] += gap[SCALE] * np.where(stack.seen[frame], np.nan_to_num(centre), 0.0)[list(LENGTHS)]
+        return float(gap @ stack.metric[frame] @ gap)
+
+    expected = [[distance(centre, frame) for frame in range(stack.count)] for centre in centres]
+    np.testing.assert_allclose(stack.distances(centres), expected, rtol=1e-6)
+    few = stack.take(slice(2, 5))
+    np.testing.assert_allclose(few.distances(centres), np.array(expected)[:, 2:5], rtol=1e-6)
 
 
 @functools.cache

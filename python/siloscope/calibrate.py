@@ -59,7 +59,7 @@ REASONS = {
 SEARCHED = 16
 """Of so many frames one is searched for the wall; the others look for it first where such a frame has shown it."""
 
-WHOLE = 64
+WHOLE = 16
 """So many frames are asked for all their pixels. Later ones can add little and are asked for a quarter of them."""
 
 Pathlike = str | PathLike[str]
@@ -81,7 +81,7 @@ def calibrate(
     """Fuse the frames of one camera in one silo to the camera's pose and the silo's geometry.
 
     Frames count by what they show, in any order; frames that disagree with the majority don't count. Where the
-    sequence shows that the camera has moved, only the frames since its last move are fused. From the 65th frame on, a
+    sequence shows that the camera has moved, only the frames since its last move are fused. From the 17th frame on, a
     quarter of a frame's pixels is asked, if that gives an answer: its deviations are twice as large, and stated so.
 
     Parameters

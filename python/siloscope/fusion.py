@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +32,11 @@ FAR = 4.0
 STARTS = 12
 """Frames from which the search for the majority's answer starts."""
 
-PIECE = 16
+PIECE = 24
 """Frames added up at a time."""
+
+UPPER = np.triu_indices(SIZE)
+"""Rows and columns of a symmetric matrix' upper triangle."""
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
@@ -101,7 +105,8 @@ class Stack:
         """Some of the frames."""
         part = object.__new__(Stack)
         for name, value in self.__dict__.items():
-            part.__dict__[name] = value[which] if isinstance(value, np.ndarray) else value
+            if name != "_expanded":
+                part.__dict__[name] = value[which] if isinstance(value, np.ndarray) else value
         part.count = len(part.answers)
         return part
 
@@ -116,6 +121,16 @@ class Stack:
 
     def distances(self, centres: Matrix) -> Matrix:
         """Squared distances (K, N) of the frames' answers from K `centres` (K, 12), each in its own covariance."""
+        held = self.answers[self.seen[:, SCALE] & ~self.free[:, SCALE], SCALE]
+        plain = np.isfinite(centres).all(axis=1) & (centres[:, SCALE, None] == held).all(axis=1)
+        squared = np.empty((len(centres), self.count))
+        squared[plain] = self._distances_expanded(centres[plain])
+        if not plain.all():
+            squared[~plain] = self._distances_with_gaps(centres[~plain])
+        return squared
+
+    def _distances_with_gaps(self, centres: Matrix) -> Matrix:
+        """For centres that lack parameters, or are of another depth scale than frames that take theirs for granted."""
         known = np.isfinite(centres)[:, None, :] & self.seen[None, :, :]
         gaps = np.where(known, self.answers[None, :, :] - centres[:, None, :], 0.0)
         fixed = ~self.free[None, :, SCALE] & known[:, :, SCALE]
@@ -126,6 +141,26 @@ class Stack:
         of_frame = gaps.transpose(1, 0, 2)
         squared: Matrix = np.einsum("nkj,nkj->kn", of_frame @ self.metric, of_frame)
         return squared
+
+    def _distances_expanded(self, centres: Matrix) -> Matrix:
+        """``(θ - c)ᵀ M (θ - c)`` as one product of matrices, multiplied out about the frames' middle."""
+        middle, of_frames = self._expanded
+        from_middle = centres - middle
+        squares = from_middle[:, UPPER[0]] * from_middle[:, UPPER[1]]
+        centres = np.hstack([squares, from_middle, np.ones((len(centres), 1))])
+        pieces = [centres @ of_frames[:, first : first + PIECE] for first in range(0, self.count, PIECE)]
+        return np.maximum(np.hstack(pieces), 0.0)
+
+    @cached_property
+    def _expanded(self) -> tuple[Vector, Matrix]:
+        """The frames' middle (12,), and from there each frame's ``M``, ``-2 M θ`` and ``θᵀ M θ`` (91, N)."""
+        middle = _middle(self)
+        own = np.where(self.seen, self.answers - middle, 0.0)
+        pull = np.einsum("nij,nj->ni", self.metric, own)
+        twice = np.where(UPPER[0] == UPPER[1], 1.0, 2.0)
+        metric = self.metric[:, UPPER[0], UPPER[1]] * twice
+        rest = np.einsum("ni,ni->n", own, pull)[:, None]
+        return middle, np.ascontiguousarray(np.hstack([metric, -2.0 * pull, rest]).T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -303,11 +338,16 @@ def _systems(stack: Stack, weights: Matrix, base: Sums) -> tuple[Matrix, Matrix,
 
 def _origin(stack: Stack, base: Sums) -> Vector:
     """A point near the answer, so that sums about it keep their digits."""
-    count = stack.seen.sum(axis=0)
+    return np.where(stack.seen.any(axis=0), _middle(stack), base.origin)
+
+
+def _middle(stack: Stack) -> Vector:
+    """Median of the frames' answers; zero for what no frame has seen."""
     if not stack.count:
-        return base.origin
-    middle = np.sort(stack.answers, axis=0)[count // 2, np.arange(SIZE)]
-    return np.where(count > 0, middle, base.origin)
+        return np.zeros(SIZE)
+    count = stack.seen.sum(axis=0)
+    middle = np.sort(stack.answers, axis=0)[np.minimum(count // 2, stack.count - 1), np.arange(SIZE)]
+    return np.where(count > 0, middle, 0.0)
 
 
 def _with_covariance(stack: Stack, weights: Vector, base: Sums, centre: Vector, excess: float) -> Fused:

@@ -91,7 +91,7 @@ fn candidates(problem: &Problem, view: View) -> Vec<(f64, Fit)> {
             weights: vec![0.0; problem.patches.list.len()],
         };
         problem.refine(&mut fit, 4, 8, 0.25);
-        refined.push((likelihood(problem, &fit), fit));
+        refined.push((likelihood(problem, &fit, 1), fit));
     }
     refined
 }
@@ -184,11 +184,11 @@ fn judge(e: &WallEvidence, inside: bool, cloud: bool) -> Result<(), Refusal> {
 
 /// Looks again for the part that is missing, now that the axis and the depth bias are known better.
 fn with_other_part(problem: &Problem, fit: Fit) -> Fit {
-    let before = likelihood(problem, &fit);
+    let before = likelihood(problem, &fit, 1);
     let Some(surface) = other_part(&fit.surface, &oriented(problem, &fit.bias)) else { return fit };
     let mut both = Fit { surface, misfit: 0.01 * surface.size(), ..fit.clone() };
     problem.refine(&mut both, 4, 3, 0.2);
-    if likelihood(problem, &both) > before { both } else { fit }
+    if likelihood(problem, &both, 1) > before { both } else { fit }
 }
 
 fn oriented(problem: &Problem, bias: &DepthBias) -> Vec<Oriented> {
@@ -208,14 +208,14 @@ fn oriented(problem: &Problem, bias: &DepthBias) -> Vec<Oriented> {
         .collect()
 }
 
-/// Log-likelihood gain of calling patches wall instead of anything else.
-pub(crate) fn likelihood(problem: &Problem, fit: &Fit) -> f64 {
+/// Log-likelihood gain of calling every `stride`-th patch wall instead of anything else, where the fit says so.
+pub(crate) fn likelihood(problem: &Problem, fit: &Fit, stride: usize) -> f64 {
     let placed = PlacedSurface::new(fit.surface);
     let gain = |(i, &weight): (usize, &f64)| {
         let contact = if weight > 0.0 { problem.contact(fit, &placed, i) } else { None };
         contact.map_or(0.0, |e| weight * (0.5 / (e.variance.sqrt() * e.cosine)).ln().max(0.0))
     };
-    fit.weights.iter().enumerate().map(gain).sum()
+    fit.weights.iter().enumerate().step_by(stride).map(gain).sum()
 }
 
 /// Leaves out a part of which hardly any wall patch is left: its parameters would be undetermined.

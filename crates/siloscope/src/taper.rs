@@ -18,20 +18,29 @@ pub fn cone_instead(problem: &Problem, cylinder: &Fit, wall: &[bool]) -> Option<
     }
     let sum: Vec3 = shown.iter().map(|p| p.at(cylinder.bias.true_depth(p.measured))).sum();
     let middle = sum / shown.len() as f64;
-    let refined = SLOPES.map(|slope| {
+    let gain = |fit: &Fit| likelihood(problem, fit, SKETCH);
+    let worth_it = gain(cylinder);
+    let sketched = SLOPES.into_iter().map(|slope| {
         let surface = cone_along(&cylinder.surface, &middle, slope);
         let mut cone = Fit { surface, misfit: 0.03 * cylinder.surface.size(), ..cylinder.clone() };
+        problem.refine(&mut cone, 5, SKETCH, 0.25);
+        cone
+    });
+    let refined = sketched.filter(|cone| gain(cone) > worth_it).map(|mut cone| {
         problem.refine(&mut cone, 5, 3, 0.25);
         problem.refine(&mut cone, 3, 3, 0.15);
-        (likelihood(problem, &cone), cone)
+        (likelihood(problem, &cone, 1), cone)
     });
-    let best = refined.into_iter().max_by(|a, b| a.0.total_cmp(&b.0));
+    let best = refined.max_by(|a, b| a.0.total_cmp(&b.0));
     let (gain, cone) = best.filter(|(_, cone)| cone.surface.cone.is_some())?;
-    (gain > CLEARLY * likelihood(problem, cylinder) && !may_be_feed(problem, &cone)).then_some(cone)
+    (gain > CLEARLY * likelihood(problem, cylinder, 1) && !may_be_feed(problem, &cone)).then_some(cone)
 }
 
 /// How much more of the frame a cone must explain: it also takes an oval silo's side a little better.
 const CLEARLY: f64 = 1.25;
+
+/// One patch in so many tells whether a cone is worth to be refined on more.
+const SKETCH: usize = 6;
 
 /// Slopes of cones that are tried in place of a cylinder.
 const SLOPES: [f64; 3] = [0.4, 0.8, 1.2];
