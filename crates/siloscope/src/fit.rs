@@ -2,6 +2,7 @@
 
 use crate::Result;
 use crate::Vec3;
+use crate::bow::bow_uncertainty;
 use crate::cloud::cloud_patches;
 use crate::coarse::{Settled, coarse_fit, drop_film, may_be_feed};
 use crate::covariance::{
@@ -301,7 +302,7 @@ fn finish(
     let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
     let placed = PlacedSurface::new(fit.surface);
     check_determined(&covariance, &placed, heights / tiles.len().max(1) as f64)?;
-    covariance += film; // it widens an answer, but takes none away
+    covariance += film + bow_uncertainty(&fit, tiles); // these widen an answer, but take none away
     let bias_is_free = free[7..OVALITY].contains(&true);
     let rays = if bias_is_free { some_rays(tiles, |patch| problem.patches.list[patch].q) } else { Vec::new() };
     let share = FrameShare::new((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free), (base, rays));

@@ -8,6 +8,7 @@ pub mod axis;
 pub mod axis_covariance;
 pub mod backproject;
 pub mod blocks;
+pub mod bow;
 pub mod camera;
 pub mod candidates;
 pub mod cloud;
