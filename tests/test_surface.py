@@ -221,6 +221,14 @@ def all_is_covered(estimate: Estimate, scene: Scene) -> None:
         assert abs(stated[name] - truth[name]) < 3.0 * std[name], name
 
 
+def test_stuck_feed_that_is_evened_out_over_a_cone_widens_the_deviation() -> None:
+    sensor = sensor_model("azure-kinect", 394)
+    scene = random_scene(394, Feed("gaussian", 0.12369, seed=394), sensor=sensor, miss=0.2)
+    stuck = Defects(film_bands=((1.5427, 2.1783, 0.0196), (1.895, 2.6401, 0.0599)), film_azimuth=5.244, seed=394)
+    scene = replace(scene, defects=stuck)
+    all_is_covered(fit(scene, "azure-kinect"), scene)  # 5 deviations off where no part is left out to see
+
+
 def test_a_cone_of_wall_above_and_feed_below_leaves_its_slope_open() -> None:
     real = {"incidence_gain": 0.05, "flying": 0.5, "dropout": 0.05, "unit": 0.001, "correlation": 0.3}
     sensor = replace(sensor_model("orbbec-astra", 7046), **real)

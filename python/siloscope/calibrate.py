@@ -279,7 +279,7 @@ def _answers(frames: Iterable[Any], one: Locate, jobs: int) -> Iterator[_Answer]
 class _Starts:
     """Where frames start: a searched one from nothing, the others from the last but one that was searched.
 
-    The last one may still be at work; only the first frames wait for it.
+    The last one may still be at work; only the first frames that are asked whole, or for a quarter, wait for it.
     """
 
     def __init__(self) -> None:
@@ -289,7 +289,8 @@ class _Starts:
     def of(self, number: int) -> Estimate | None:
         if number % SEARCHED == 0:
             return None
-        while len(self.searched) > (1 if number > SEARCHED else 0):
+        first = any(0 <= number - begin < SEARCHED for begin in (0, WHOLE))
+        while len(self.searched) > (0 if first else 1):
             found = self.searched.popleft().result()[1]
             self.start = found if found is not None and found.ok else self.start
         return self.start

@@ -9,6 +9,7 @@ use crate::covariance::{
     lasting_misfit, relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened,
 };
 use crate::known_wall::{KnownWall, confirmed};
+use crate::parts::change_without_a_part;
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
 use crate::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
 use crate::refine::{Fit, OVALITY_STD, Prior, Problem, free_parameters, tukey};
@@ -303,6 +304,9 @@ fn finish(
     let placed = PlacedSurface::new(fit.surface);
     check_determined(&covariance, &placed, heights / tiles.len().max(1) as f64)?;
     covariance += film + bow_uncertainty(&fit, tiles); // these widen an answer, but take none away
+    if let Some(change) = change_without_a_part(&fit, &joint, (&model, &covariance), (tiles, &pulls), free[OVALITY]) {
+        covariance += change * change.transpose();
+    }
     let bias_is_free = free[7..OVALITY].contains(&true);
     let rays = if bias_is_free { some_rays(tiles, |patch| problem.patches.list[patch].q) } else { Vec::new() };
     let share = FrameShare::new((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free), (base, rays));

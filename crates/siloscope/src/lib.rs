@@ -28,6 +28,7 @@ pub mod nearest;
 pub mod neighbours;
 pub mod normals;
 pub mod outermost;
+pub mod parts;
 pub mod patches;
 pub mod pixels;
 pub mod polish;
