@@ -7,12 +7,15 @@
 use crate::polish::TileEquation;
 use crate::refine::{Fit, System, tukey};
 use crate::surface::{Information, OVALITY, PARAMETERS, Parameters, Part};
+use std::sync::LazyLock;
 
 /// Each part of the wall is cut into so many bands with as much of it each.
 const BANDS: usize = 4;
 /// And along so many planes through the silo's axis, into sectors.
 const AXES: usize = 3;
 const SECTORS: usize = 1 << AXES;
+/// So many cells of cylinder and cone there are: as many as a word has bits.
+const CELLS: usize = 2 * BANDS * SECTORS;
 /// Of so many tiles one is asked for its information.
 const SKETCH: usize = 4;
 /// A change by more than so many of its standard deviations is none by chance, nor by the wall's form.
@@ -45,16 +48,18 @@ pub fn change_without_a_part(
     oval: bool,
 ) -> Option<Parameters> {
     let cells = cells(tiles, pulls);
-    let all = sum(&cells, |_, _, _| true);
+    let (all, seen) = (gradient(&cells, EVERYWHERE), count(&cells, EVERYWHERE));
     let mut left_open = Parameters::zeros(); // all else is at its best
     if !oval {
-        left_open.fixed_rows_mut::<2>(OVALITY).copy_from(&all.gradient.fixed_rows::<2>(OVALITY));
+        left_open.fixed_rows_mut::<2>(OVALITY).copy_from(&all.fixed_rows::<2>(OVALITY));
     }
     let now = model * left_open;
-    let change = |without: &Cell| {
-        if without.count < FEWEST || all.count < without.count + FEWEST || without.pulls_as_noise_does() {
+    let change = |&part: &u64| {
+        let without = count(&cells, part);
+        if without < FEWEST || seen < without + FEWEST || pulls_as_noise_does(&cells, part) {
             return None;
         }
+        let without = Cell::sum(&cells, part);
         let rest = System { information: joint.information - without.information, ..joint.clone() };
         let (spread, _) = rest.covariance(fit)?;
         let change = now - spread * (left_open - without.gradient);
@@ -67,37 +72,37 @@ pub fn change_without_a_part(
         let most = free.map(excess).try_fold(0.0, |most, excess| Some(f64::max(most, excess?)))?;
         (most > SURE * SURE).then_some((most, change))
     };
-    let (most, change) = parts(&cells).iter().filter_map(change).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    let (most, change) = PARTS.iter().filter_map(change).max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(change * (1.0 - SURE * SURE / most).sqrt())
 }
 
 /// Least change by chance, as a share of a variance.
 const LITTLE: f64 = 1e-3;
 
-/// What may be left out: the upper or lower bands of either part of the wall, and one side of all of it, of its cone, and
-/// of the cone's upper and lower half.
-fn parts(cells: &[Cell]) -> Vec<Cell> {
+/// What may be left out, as the bits of its cells: the upper or lower bands of either part of the wall, and one side of all
+/// of it, of its cone, and of the cone's upper and lower half.
+static PARTS: LazyLock<Vec<u64>> = LazyLock::new(|| {
+    let cells = |asked: &dyn Fn(usize, usize, usize) -> bool| {
+        (0..CELLS)
+            .filter(|i| asked(i / (BANDS * SECTORS), i / SECTORS % BANDS, i % SECTORS))
+            .fold(0, |set, i| set | 1 << i)
+    };
     let mut parts = Vec::new();
-    for part in [Part::Cylinder, Part::Cone] {
-        for cut in 1..BANDS {
-            parts.push(sum(cells, |p, band, _| p == part && band < cut));
-            parts.push(sum(cells, |p, band, _| p == part && band >= cut));
-        }
+    for (part, cut) in (0..2).flat_map(|part| (1..BANDS).map(move |cut| (part, cut))) {
+        parts.push(cells(&|p, band, _| p == part && band < cut));
+        parts.push(cells(&|p, band, _| p == part && band >= cut));
     }
+    let cone = cells(&|part, _, _| part == 1);
+    let upper = cells(&|_, band, _| band < BANDS / 2);
     for (axis, side) in (0..AXES).flat_map(|axis| [(axis, 0), (axis, 1)]) {
-        let on_side = |sector: usize| sector >> axis & 1 == side;
-        let half = |bands: std::ops::Range<usize>| {
-            sum(cells, |part, band, sector| part == Part::Cone && bands.contains(&band) && on_side(sector))
-        };
-        let [upper, lower] = [half(0..BANDS / 2), half(BANDS / 2..BANDS)];
-        let mut cone = upper.clone();
-        cone.add(&lower);
-        let mut all = sum(cells, |part, _, sector| part == Part::Cylinder && on_side(sector));
-        all.add(&cone);
-        parts.extend([all, cone, upper, lower]);
+        let side = cells(&|_, _, sector| sector >> axis & 1 == side);
+        parts.extend([side, side & cone, side & cone & upper, side & cone & !upper]);
     }
     parts
-}
+});
+
+/// All cells.
+const EVERYWHERE: u64 = u64::MAX;
 
 /// The tiles by part, band and sector.
 fn cells(tiles: &[TileEquation], pulls: &[f64]) -> Vec<Cell> {
@@ -107,7 +112,7 @@ fn cells(tiles: &[TileEquation], pulls: &[f64]) -> Vec<Cell> {
         z.sort_unstable_by(f64::total_cmp);
         [1, 2, 3].map(|band| z.get(band * z.len() / BANDS).copied().unwrap_or(f64::INFINITY))
     });
-    let mut cells = vec![Cell::empty(); 2 * BANDS * SECTORS];
+    let mut cells = vec![Cell::empty(); CELLS];
     for (i, (TileEquation { equation: e, .. }, pull)) in tiles.iter().zip(pulls).enumerate() {
         let part = usize::from(e.part == Part::Cone);
         let band = cuts[part].iter().filter(|cut| e.z > **cut).count();
@@ -130,16 +135,24 @@ fn sector([x, y]: [f64; 2]) -> usize {
 
 const ROOT_3: f64 = 1.732_050_807_568_877_2;
 
-/// The sum of the cells that are asked for by part, band and sector.
-fn sum(cells: &[Cell], asked: impl Fn(Part, usize, usize) -> bool) -> Cell {
-    let part = |i: usize| if i < BANDS * SECTORS { Part::Cylinder } else { Part::Cone };
-    let mut sum = Cell::empty();
-    for (i, cell) in cells.iter().enumerate().filter(|(_, cell)| cell.count > 0) {
-        if asked(part(i), i / SECTORS % BANDS, i % SECTORS) {
-            sum.add(cell);
-        }
-    }
-    sum
+/// The cells of a part.
+fn of(cells: &[Cell], part: u64) -> impl Iterator<Item = &Cell> {
+    cells.iter().enumerate().filter(move |(i, cell)| part >> i & 1 == 1 && cell.count > 0).map(|(_, cell)| cell)
+}
+
+fn count(cells: &[Cell], part: u64) -> usize {
+    of(cells, part).map(|cell| cell.count).sum()
+}
+
+fn gradient(cells: &[Cell], part: u64) -> Parameters {
+    of(cells, part).map(|cell| cell.gradient).sum()
+}
+
+/// Whether chance explains the gradient of a part: then the answer does not change without it.
+fn pulls_as_noise_does(cells: &[Cell], part: u64) -> bool {
+    let gradient = gradient(cells, part);
+    let information = of(cells, part).fold(Parameters::zeros(), |sum, cell| sum + cell.information.diagonal());
+    (0..PARAMETERS).all(|k| gradient[k].powi(2) <= SURE * SURE * information[k])
 }
 
 impl Cell {
@@ -147,15 +160,13 @@ impl Cell {
         Self { information: Information::zeros(), gradient: Parameters::zeros(), count: 0 }
     }
 
-    /// Whether chance explains its gradient: then the answer does not change without it.
-    fn pulls_as_noise_does(&self) -> bool {
-        (0..PARAMETERS).all(|k| self.gradient[k].powi(2) <= SURE * SURE * self.information[(k, k)])
-    }
-
-    fn add(&mut self, other: &Self) {
-        self.information += other.information;
-        self.gradient += other.gradient;
-        self.count += other.count;
+    fn sum(cells: &[Self], part: u64) -> Self {
+        let mut sum = Self::empty();
+        for cell in of(cells, part) {
+            sum.information += cell.information;
+            sum.gradient += cell.gradient;
+        }
+        sum
     }
 }
 
@@ -259,7 +270,7 @@ mod tests {
 
     #[test]
     fn an_ovality_that_is_left_out_of_the_answer_is_no_change() {
-        let oval = |_: Part, p: Vec3| 0.0007 * (p.x * p.x - p.y * p.y) / (p.x * p.x + p.y * p.y);
+        let oval = |_: Part, p: Vec3| 0.0003 * (p.x * p.x - p.y * p.y) / (p.x * p.x + p.y * p.y);
         let tiles = tiles(2.0, false, oval);
         assert_eq!(change(&tiles, false), None);
         assert!(change(&tiles, true).is_some());
