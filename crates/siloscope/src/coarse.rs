@@ -123,7 +123,6 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
     let mut evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
     evidence.stuck = stuck(problem, &fit, &wall);
     judge(&evidence, fit.inside, problem.patches.cloud)?;
-    drop_bare_parts(problem, &mut fit, &wall);
     Ok(Settled { fit, wall, evidence })
 }
 
@@ -219,7 +218,7 @@ pub(crate) fn likelihood(problem: &Problem, fit: &Fit, stride: usize) -> f64 {
 }
 
 /// Leaves out a part of which hardly any wall patch is left: its parameters would be undetermined.
-fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
+pub fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
     const ENOUGH: usize = 12;
     let placed = PlacedSurface::new(fit.surface);
     let (mut cylinder, mut cone) = (0, 0);

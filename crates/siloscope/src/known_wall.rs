@@ -3,7 +3,7 @@
 //! Only the search is spared. What is found stands up to the same evidence as a wall found from nothing, and it must
 //! confirm the known wall: whatever is new, lost, moved, or hard to see sends the frame back to the search.
 
-use crate::coarse::{Settled, settled, with_free_size};
+use crate::coarse::{Settled, drop_bare_parts, settled, with_free_size};
 use crate::patches::Patches;
 use crate::refine::{Fit, Prior, Problem};
 use crate::sensor::{DepthBias, NoiseLaw};
@@ -48,7 +48,9 @@ pub fn confirmed(
         Problem { patches, noise, prior, pixel }.refine(&mut fit, 3, 4, 0.2);
         patches.unbias_normals(&fit.bias);
     }
-    let found = settled(&Problem { patches, noise, prior, pixel }, fit).ok()?;
+    let problem = Problem { patches, noise, prior, pixel };
+    let mut found = settled(&problem, fit).ok()?;
+    drop_bare_parts(&problem, &mut found.fit, &found.wall);
     let rough = known.misfit.max(found.fit.misfit) > MOST_MISFIT * found.fit.surface.size();
     (!(bends && rough) && found.evidence.share > LEAST_SHARE && known.is_same(&found.fit.surface)).then_some(found)
 }
