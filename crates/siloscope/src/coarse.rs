@@ -48,6 +48,9 @@ pub(crate) fn with_free_size(prior: &Prior) -> Prior {
     Prior { radius: prior.radius.filter(|_| prior.bias_std[1] == 0.0), ..prior.clone() }
 }
 
+/// Least share of the patches that must be wall where something likelier was refused: less is found in almost anything.
+const LEAST_AFTER_ALL: f64 = 0.05;
+
 /// The likeliest candidate that stands up to the evidence, or why the likeliest does not.
 fn best_settled(
     patches: &mut Patches,
@@ -63,9 +66,9 @@ fn best_settled(
             patches.unbias_normals(&fit.bias);
         }
         match settled(&Problem { patches, noise, prior, pixel }, fit) {
-            Ok(found) => return Ok(found),
+            Ok(found) if rank == 0 || found.evidence.share > LEAST_AFTER_ALL => return Ok(found),
             Err(why) if rank == 0 => refusal = why,
-            Err(_) => {}
+            _ => {}
         }
     }
     Err(refusal)
