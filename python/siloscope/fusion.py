@@ -102,10 +102,10 @@ class Stack:
         return metric
 
     def take(self, which: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Stack:
-        """Some of the frames."""
+        """Some of the frames; what is computed once for all of them is not taken along."""
         part = object.__new__(Stack)
         for name, value in self.__dict__.items():
-            if name != "_expanded":
+            if name not in Stack.__dict__:
                 part.__dict__[name] = value[which] if isinstance(value, np.ndarray) else value
         part.count = len(part.answers)
         return part

@@ -19,7 +19,7 @@ const FLATTEST: f64 = 0.2;
 /// Fewest tiles that tell.
 const FEWEST: usize = 30;
 
-/// A tile of the cone: its height, its distance from the wall, and its weight.
+/// A tile of the cone: its height and its distance from the wall, metres, and its weight, 1/m².
 #[derive(Debug, Clone, Copy)]
 struct Tile {
     z: f64,

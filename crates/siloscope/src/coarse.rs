@@ -6,7 +6,7 @@ use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, NoiseLaw};
 use crate::start::{Oriented, Start, View, other_part, starts, steeper_cone};
-use crate::surface::{Part, PlacedSurface, Reach};
+use crate::surface::{Part, PlacedSurface, Reach, SiloSurface};
 use crate::taper::cone_instead;
 use crate::verdict::{WallEvidence, wall_evidence};
 use crate::vertex::is_covered;
@@ -220,21 +220,21 @@ pub(crate) fn likelihood(problem: &Problem, fit: &Fit, stride: usize) -> f64 {
     fit.weights.iter().enumerate().step_by(stride).map(gain).sum()
 }
 
-/// Leaves out a part of which hardly any wall patch is left: its parameters would be undetermined.
-pub fn drop_bare_parts(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
+/// The surface without a part of which hardly any wall patch is left: its parameters would be undetermined.
+pub fn without_bare_parts(problem: &Problem, fit: &Fit, wall: &[bool]) -> SiloSurface {
     const ENOUGH: usize = 12;
-    let placed = PlacedSurface::new(fit.surface);
+    let (placed, surface) = (PlacedSurface::new(fit.surface), fit.surface);
     let (mut cylinder, mut cone) = (0, 0);
     for contact in (0..wall.len()).filter(|&i| wall[i]).filter_map(|i| problem.contact(fit, &placed, i)) {
         *(if contact.part == Part::Cylinder { &mut cylinder } else { &mut cone }) += 1;
         if cylinder.min(cone) >= ENOUGH {
-            return;
+            return surface;
         }
     }
-    if cone < ENOUGH && cylinder >= ENOUGH {
-        fit.surface.cone = None;
-    } else if cylinder < ENOUGH && cone >= ENOUGH {
-        fit.surface.radius = None;
+    match (cylinder >= ENOUGH, cone >= ENOUGH) {
+        (true, false) => SiloSurface { cone: None, ..surface },
+        (false, true) => SiloSurface { radius: None, ..surface },
+        _ => surface,
     }
 }
 

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::Vec3;
 use crate::bow::bow_uncertainty;
 use crate::cloud::cloud_patches;
-use crate::coarse::{Settled, coarse_fit, drop_bare_parts, drop_film, may_be_feed};
+use crate::coarse::{Settled, coarse_fit, drop_film, may_be_feed, without_bare_parts};
 use crate::covariance::{
     lasting_misfit, relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened,
 };
@@ -125,7 +125,7 @@ fn measured(
     if let (Some((radius, _)), true) = (know.radius, prior.bias_std[1] > 0.0) {
         fit.rescale_to(radius); // few patches of the cylinder tell the scale, though they leave its radius open
     }
-    drop_bare_parts(&problem, &mut fit, &wall);
+    fit.surface = without_bare_parts(&problem, &fit, &wall);
     drop_film(&problem, &mut fit, &wall);
     known.drop_parts_without(&fit.surface);
     let (noise, mut equations) = on_pixels(problem, image, &mut fit, &wall, know.error.noise, looks);
@@ -234,7 +234,7 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
     let Settled { mut fit, wall, evidence } = found;
     clock.lap("coarse fit");
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
-    drop_bare_parts(&problem, &mut fit, &wall);
+    fit.surface = without_bare_parts(&problem, &fit, &wall);
     let mut equations = patch_equations(&problem, &fit, &wall);
     let mut result = match finish(&problem, fit, &mut equations, (evidence, known), false) {
         Ok(found) => found,

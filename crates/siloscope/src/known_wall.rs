@@ -3,7 +3,7 @@
 //! Only the search is spared. What is found stands up to the same evidence as a wall found from nothing, and it must
 //! confirm the known wall: whatever is new, lost, moved, or hard to see sends the frame back to the search.
 
-use crate::coarse::{Settled, drop_bare_parts, settled, with_free_size};
+use crate::coarse::{Settled, settled, with_free_size, without_bare_parts};
 use crate::patches::Patches;
 use crate::refine::{Fit, Prior, Problem};
 use crate::sensor::{DepthBias, NoiseLaw};
@@ -49,10 +49,10 @@ pub fn confirmed(
         patches.unbias_normals(&fit.bias);
     }
     let problem = Problem { patches, noise, prior, pixel };
-    let mut found = settled(&problem, fit).ok()?;
-    drop_bare_parts(&problem, &mut found.fit, &found.wall);
+    let found = settled(&problem, fit).ok()?;
     let rough = known.misfit.max(found.fit.misfit) > MOST_MISFIT * found.fit.surface.size();
-    (!(bends && rough) && found.evidence.share > LEAST_SHARE && known.is_same(&found.fit.surface)).then_some(found)
+    let same = known.is_same(&without_bare_parts(&problem, &found.fit, &found.wall));
+    (!(bends && rough) && found.evidence.share > LEAST_SHARE && same).then_some(found)
 }
 
 impl KnownWall {

@@ -7,6 +7,7 @@
 use crate::polish::TileEquation;
 use crate::refine::{Fit, System, tukey};
 use crate::surface::{Information, OVALITY, PARAMETERS, Parameters, Part};
+use std::array::from_fn;
 use std::sync::LazyLock;
 
 /// Each part of the wall is cut into so many bands with as much of it each.
@@ -22,6 +23,8 @@ const SKETCH: usize = 4;
 const SURE: f64 = 3.0;
 /// Where what is left tells a parameter less surely than this, as a multiple of its variance, it tells nothing about it.
 const WEAK: f64 = 25.0;
+/// Least change by chance, as a share of a variance.
+const LITTLE: f64 = 1e-3;
 /// Fewest tiles of a part that is left out, and of what is left.
 const FEWEST: usize = 24;
 /// The parameters of the wall: pose, radius, cone.
@@ -76,9 +79,6 @@ pub fn change_without_a_part(
     Some(change * (1.0 - SURE * SURE / most).sqrt())
 }
 
-/// Least change by chance, as a share of a variance.
-const LITTLE: f64 = 1e-3;
-
 /// What may be left out, as the bits of its cells: the upper or lower bands of either part of the wall, and one side of all
 /// of it, of its cone, and of the cone's upper and lower half.
 static PARTS: LazyLock<Vec<u64>> = LazyLock::new(|| {
@@ -110,7 +110,7 @@ fn cells(tiles: &[TileEquation], pulls: &[f64]) -> Vec<Cell> {
         let some = tiles.iter().step_by(SKETCH).map(|t| &t.equation).filter(|e| e.part == part);
         let mut z: Vec<f64> = some.map(|e| e.z).collect();
         z.sort_unstable_by(f64::total_cmp);
-        [1, 2, 3].map(|band| z.get(band * z.len() / BANDS).copied().unwrap_or(f64::INFINITY))
+        from_fn::<_, { BANDS - 1 }, _>(|i| z.get((i + 1) * z.len() / BANDS).copied().unwrap_or(f64::INFINITY))
     });
     let mut cells = vec![Cell::empty(); CELLS];
     for (i, (TileEquation { equation: e, .. }, pull)) in tiles.iter().zip(pulls).enumerate() {
