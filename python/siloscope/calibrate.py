@@ -120,8 +120,10 @@ def calibrate(
     settings = _settings(before, sensor=sensor, diameter=diameter, gravity=gravity)
     source = _source(frames, camera, depth_unit)
     one = _locator(camera, depth_unit, settings)
-    read = source.ahead(jobs) if isinstance(source, FrameSource) else source
-    answers = list(_answers(progress(read) if progress else read, one, jobs))
+    ahead = 0 if jobs == 1 else 2 * jobs
+    with _Inline() if jobs == 1 else ThreadPoolExecutor(jobs) as pool:
+        read = source.ahead(pool, ahead) if isinstance(source, FrameSource) else source
+        answers = list(_answers(progress(read) if progress else read, one, pool, ahead))
     lost = source.problems if isinstance(source, FrameSource) else []
     located = time.perf_counter()
     told = {name: value for name, value in (("sensor", sensor), ("diameter", diameter)) if value is not None}
@@ -259,21 +261,20 @@ def _by_a_quarter(frame: Any, camera: Camera | None, known: dict[str, Any]) -> E
     return estimate if estimate is not None and estimate.ok else None
 
 
-def _answers(frames: Iterable[Any], one: Locate, jobs: int) -> Iterator[_Answer]:
-    """The frames located in order; with several jobs the next ones are read while others are being located.
+def _answers(frames: Iterable[Any], one: Locate, pool: Executor, ahead: int) -> Iterator[_Answer]:
+    """The frames located in order; the next ones are read and located in `pool`, so many `ahead`.
 
-    Which frame starts from which answer is settled by their order alone, so that the jobs don't change any answer.
+    Which frame starts from which answer is settled by their order alone, so that the pool doesn't change any answer.
     """
     waiting: deque[Future[tuple[_Answer, Estimate | None]]] = deque()
     starts = _Starts()
-    with _Inline() if jobs == 1 else ThreadPoolExecutor(jobs) as pool:
-        for number, frame in enumerate(frames):
-            waiting.append(pool.submit(one, number, frame, starts.of(number)))
-            starts.add(number, waiting[-1])
-            if len(waiting) > 2 * jobs or jobs == 1:
-                yield waiting.popleft().result()[0]
-        while waiting:
+    for number, frame in enumerate(frames):
+        waiting.append(pool.submit(one, number, frame, starts.of(number)))
+        starts.add(number, waiting[-1])
+        if len(waiting) > ahead:
             yield waiting.popleft().result()[0]
+    while waiting:
+        yield waiting.popleft().result()[0]
 
 
 class _Starts:

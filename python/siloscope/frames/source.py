@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
@@ -182,16 +182,16 @@ class FrameSource(ABC):
         return True
 
     def __iter__(self) -> Iterator[Frame]:
-        return self._frames(1)
+        return self._frames(None, 0)
 
-    def ahead(self, jobs: int) -> Ahead:
-        """The frames in the same order; the next ones are decoded by so many threads while one is being used."""
-        return Ahead(self, jobs)
+    def ahead(self, pool: Executor, count: int) -> Ahead:
+        """The frames in the same order; the next `count` are decoded in `pool` while one is being used."""
+        return Ahead(self, pool, count)
 
-    def _frames(self, jobs: int) -> Iterator[Frame]:
+    def _frames(self, pool: Executor | None, count: int) -> Iterator[Frame]:
         self.problems = []
         read = 0
-        for item, frame in self._decoded(jobs):
+        for item, frame in self._decoded(pool, count):
             if isinstance(frame, InputError):
                 self.problems.append(_told(item.label, frame))
                 continue
@@ -207,23 +207,23 @@ class FrameSource(ABC):
             raise IndexError(f"{self.name}: no frame {index}")
         return self._finished(item)
 
-    def _decoded(self, jobs: int) -> Iterator[tuple[Item, Frame | InputError]]:
+    def _decoded(self, pool: Executor | None, count: int) -> Iterator[tuple[Item, Frame | InputError]]:
         """The items in order, each with its frame or what is wrong with it."""
         items = self._items_before_damage()
-        if jobs == 1 or not self.independent:
+        if pool is None or not self.independent:
             yield from ((item, self._attempt(item)) for item in items)
             return
         waiting: deque[tuple[Item, Future[Frame | InputError]]] = deque()
-        pool = ThreadPoolExecutor(jobs)
         try:
             for item in items:
                 waiting.append((item, pool.submit(self._attempt, item)))
-                if len(waiting) > 2 * jobs:
+                if len(waiting) > count:
                     item, frame = waiting.popleft()
                     yield item, frame.result()
             yield from ((item, frame.result()) for item, frame in waiting)
         finally:
-            pool.shutdown(cancel_futures=True)
+            for _, frame in waiting:
+                frame.cancel()
 
     def _attempt(self, item: Item) -> Frame | InputError:
         try:
@@ -308,9 +308,10 @@ class FrameSource(ABC):
 class Ahead:
     """What `FrameSource.ahead` gives: the source's frames, to be gone through once or several times."""
 
-    def __init__(self, source: FrameSource, jobs: int) -> None:
+    def __init__(self, source: FrameSource, pool: Executor, count: int) -> None:
         self.source = source
-        self.jobs = jobs
+        self.pool = pool
+        self.count = count
 
     def __len__(self) -> int:
         return len(self.source)
@@ -319,7 +320,7 @@ class Ahead:
         return True
 
     def __iter__(self) -> Iterator[Frame]:
-        return self.source._frames(self.jobs)
+        return self.source._frames(self.pool, self.count)
 
 
 def _told(label: str, error: InputError) -> str:
