@@ -122,15 +122,17 @@ class Stack:
     def distances(self, centres: Matrix) -> Matrix:
         """Squared distances (K, N) of the frames' answers from K `centres` (K, 12), each in its own covariance."""
         held = self.answers[self.seen[:, SCALE] & ~self.free[:, SCALE], SCALE]
-        plain = np.isfinite(centres).all(axis=1) & (centres[:, SCALE, None] == held).all(axis=1)
+        plain = (centres[:, SCALE, None] == held).all(axis=1)
+        lacking = np.where(plain, ~np.isfinite(centres) @ (1 << np.arange(SIZE)), -1)
         squared = np.empty((len(centres), self.count))
-        squared[plain] = self._distances_expanded(centres[plain])
-        if not plain.all():
-            squared[~plain] = self._distances_with_gaps(centres[~plain])
+        for which in set(lacking.tolist()):
+            some = lacking == which
+            by = self._distances_by_frame if which < 0 else self._distances_expanded
+            squared[some] = by(centres[some])
         return squared
 
-    def _distances_with_gaps(self, centres: Matrix) -> Matrix:
-        """For centres that lack parameters, or are of another depth scale than frames that take theirs for granted."""
+    def _distances_by_frame(self, centres: Matrix) -> Matrix:
+        """For centres of another depth scale than frames that take theirs for granted."""
         known = np.isfinite(centres)[:, None, :] & self.seen[None, :, :]
         gaps = np.where(known, self.answers[None, :, :] - centres[:, None, :], 0.0)
         fixed = ~self.free[None, :, SCALE] & known[:, :, SCALE]
@@ -143,24 +145,47 @@ class Stack:
         return squared
 
     def _distances_expanded(self, centres: Matrix) -> Matrix:
-        """``(θ - c)ᵀ M (θ - c)`` as one product of matrices, multiplied out about the frames' middle."""
-        middle, of_frames = self._expanded
-        from_middle = centres - middle
+        """``(θ - c)ᵀ M (θ - c)`` as one product of matrices, multiplied out; all centres lack the same parameters."""
+        known = np.isfinite(centres[0])
+        of_frames = self._expanded.get(known.tobytes())
+        if of_frames is None:
+            of_frames = self._expanded[known.tobytes()] = self._multiplied_out(known)
+        from_middle = np.where(known, centres - self.middle, 0.0)
         squares = from_middle[:, UPPER[0]] * from_middle[:, UPPER[1]]
         centres = np.hstack([squares, from_middle, np.ones((len(centres), 1))])
         pieces = [centres @ of_frames[:, first : first + PIECE] for first in range(0, self.count, PIECE)]
         return np.maximum(np.hstack(pieces), 0.0)
 
-    @cached_property
-    def _expanded(self) -> tuple[Vector, Matrix]:
-        """The frames' middle (12,), and from there each frame's ``M``, ``-2 M θ`` and ``θᵀ M θ`` (91, N)."""
-        middle = _middle(self)
-        own = np.where(self.seen, self.answers - middle, 0.0)
-        pull = np.einsum("nij,nj->ni", self.metric, own)
-        twice = np.where(UPPER[0] == UPPER[1], 1.0, 2.0)
-        metric = self.metric[:, UPPER[0], UPPER[1]] * twice
+    def _multiplied_out(self, known: NDArray[np.bool_]) -> Matrix:
+        """Each frame's ``M``, ``-2 M θ`` and ``θᵀ M θ`` (91, N) about the middle, of the `known` parameters (12,)."""
+        own = np.where(self.seen & known, self.answers - self.middle, 0.0)
+        metric = np.where(known[:, None] & known, self.metric, 0.0)
+        pull = np.einsum("nij,nj->ni", metric, own)
         rest = np.einsum("ni,ni->n", own, pull)[:, None]
-        return middle, np.ascontiguousarray(np.hstack([metric, -2.0 * pull, rest]).T)
+        twice = np.where(UPPER[0] == UPPER[1], 1.0, 2.0)
+        upper = metric[:, UPPER[0], UPPER[1]] * twice
+        return np.ascontiguousarray(np.hstack([upper, -2.0 * pull, rest]).T)
+
+    @cached_property
+    def _expanded(self) -> dict[bytes, Matrix]:
+        """What has been multiplied out, by the parameters that are known."""
+        return {}
+
+    @cached_property
+    def middle(self) -> Vector:
+        """Median of the frames' answers (12,); zero for what no frame has seen."""
+        if not self.count:
+            return np.zeros(SIZE)
+        count = self.seen.sum(axis=0)
+        middle = np.sort(self.answers, axis=0)[np.minimum(count // 2, self.count - 1), np.arange(SIZE)]
+        return np.where(count > 0, middle, 0.0)
+
+    @cached_property
+    def equations(self) -> Matrix:
+        """``Λ`` and ``Λ (θ - middle) - g`` of each frame, one after the other (N, 156)."""
+        gap = np.where(self.seen, self.answers - self.middle, 0.0)
+        pulls = np.einsum("nij,nj->ni", self.information, gap) - self.gradient
+        return np.hstack([self.information.reshape(-1, SIZE * SIZE), pulls])
 
 
 @dataclass(frozen=True, eq=False)
@@ -306,11 +331,9 @@ def _excess(squared: Vector, dof: NDArray[np.int_]) -> float:
 
 def _added(stack: Stack, weights: Matrix, origin: Vector) -> tuple[Matrix, Matrix]:
     """``Σ w Λ`` (K, 12, 12) and ``Σ w (Λ (θ - origin) - g)`` (K, 12)."""
-    gap = np.where(stack.seen, stack.answers - origin, 0.0)
-    pulls = np.einsum("nij,nj->ni", stack.information, gap) - stack.gradient
-    both = np.concatenate([stack.information.reshape(-1, SIZE * SIZE), pulls], axis=1)
-    information, pull = np.split(_product(weights, both), [SIZE * SIZE], axis=1)
-    return information.reshape(-1, SIZE, SIZE), pull
+    total = _product(weights, stack.equations)
+    information = total[:, : SIZE * SIZE].reshape(-1, SIZE, SIZE)
+    return information, total[:, SIZE * SIZE :] + information @ (stack.middle - origin)
 
 
 def _product(weights: Matrix, rows: Matrix) -> Matrix:
@@ -338,16 +361,7 @@ def _systems(stack: Stack, weights: Matrix, base: Sums) -> tuple[Matrix, Matrix,
 
 def _origin(stack: Stack, base: Sums) -> Vector:
     """A point near the answer, so that sums about it keep their digits."""
-    return np.where(stack.seen.any(axis=0), _middle(stack), base.origin)
-
-
-def _middle(stack: Stack) -> Vector:
-    """Median of the frames' answers; zero for what no frame has seen."""
-    if not stack.count:
-        return np.zeros(SIZE)
-    count = stack.seen.sum(axis=0)
-    middle = np.sort(stack.answers, axis=0)[np.minimum(count // 2, stack.count - 1), np.arange(SIZE)]
-    return np.where(count > 0, middle, 0.0)
+    return np.where(stack.seen.any(axis=0), stack.middle, base.origin)
 
 
 def _with_covariance(stack: Stack, weights: Vector, base: Sums, centre: Vector, excess: float) -> Fused:
