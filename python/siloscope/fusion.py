@@ -99,7 +99,7 @@ class Stack:
         spread = spread * scale[:, :, None] * scale[:, None, :]
         joint = joint * scale[:, :, None]
         metric: Matrix = np.einsum("nji,njk->nik", joint, np.linalg.solve(spread, joint))
-        return metric
+        return 0.5 * (metric + metric.transpose(0, 2, 1))  # solving leaves it symmetric to some digits only
 
     def take(self, which: NDArray[np.bool_] | NDArray[np.intp] | slice) -> Stack:
         """Some of the frames; what is computed once for all of them is not taken along."""
