@@ -1,8 +1,9 @@
 //! How sure the fit is: the noise's covariance, widened by what the residuals say about the model, and the scale.
 
-use crate::patches::{DEEPEST, DOWN, NONE, RIGHT};
+use crate::common::variance_of_neighbours;
+use crate::patches::DEEPEST;
 use crate::polish::TileEquation;
-use crate::refine::{Equation, Fit, Problem, System, tukey};
+use crate::refine::{Equation, Fit, Problem, System, tukey, tukey_slope};
 use crate::surface::{Information, OVALITY, PARAMETERS, Parameters};
 use nalgebra::{Matrix4, Vector4};
 
@@ -10,7 +11,8 @@ use nalgebra::{Matrix4, Vector4};
 ///
 /// Residuals that are correlated over many tiles (dents, corrugation, a warped lens) don't average out as noise does.
 /// The sum over groups of the outer product of their gradients estimates what they really do to the parameters. Groups
-/// are blocks of the image, rings of equal height (corrugation, seams) and sectors (upright seams, ovality).
+/// are single tiles (noise that the law does not know of), blocks of the image, rings of equal height (corrugation, seams)
+/// and sectors (upright seams, ovality).
 pub fn widened(
     problem: &Problem,
     model: &Information,
@@ -25,15 +27,29 @@ pub fn widened(
     };
     let groups =
         [groups(tiles, pulls, |t| block(problem, t.patch)), groups(tiles, pulls, ring), groups(tiles, pulls, sector)];
-    groups.iter().fold(*model, |covariance, groups| {
-        let mut spread = System::empty();
-        groups.iter().for_each(|g| spread.add_row(g, 0.0, 1.0));
+    let sandwich = |spread: System| {
         let mut spread = spread.information + system.prior;
         spread.fill_upper_triangle_with_lower_triangle();
-        larger(&covariance, &(model * spread * model * chance(groups.len())))
+        model * spread * model
+    };
+    let (mut alone, together) = (System::empty(), flatter(tiles) * variance_of_neighbours(problem.patches, tiles));
+    tiles.iter().zip(pulls).for_each(|(t, pull)| alone.add_row(&t.equation.jacobian, 0.0, pull * pull * together));
+    groups.iter().fold(larger(model, &sandwich(alone)), |covariance, groups| {
+        let mut spread = System::empty();
+        groups.iter().for_each(|g| spread.add_row(g, 0.0, 1.0));
+        larger(&covariance, &(sandwich(spread) * chance(groups.len())))
     })
 }
 
+/// By how much larger the variance is because large residuals count less: the square of the weights over the slopes.
+fn flatter(tiles: &[TileEquation]) -> f64 {
+    let squared = tiles.iter().map(|t| t.equation.residual.powi(2) / t.equation.variance);
+    let (weights, slopes) = squared.fold((0.0, 0.0), |(w, s), squared| (w + tukey(squared), s + tukey_slope(squared)));
+    if slopes > 0.0 { f64::powi(weights / slopes, 2).clamp(1.0, MOST_FLATTER) } else { MOST_FLATTER }
+}
+
+/// Most that counting large residuals less makes of a variance.
+const MOST_FLATTER: f64 = 4.0;
 /// Rings of equal height over the wall's depth.
 const RINGS: f64 = 160.0;
 /// Sectors around the axis.
@@ -96,34 +112,6 @@ pub fn relief_uncertainty(
         .map_or(Information::zeros(), |(spread, _)| spread + spread * pull * (spread * pull).transpose())
 }
 
-/// How much of the misfit is the wall's, metres across it.
-///
-/// All of it where neighbouring pixels' noise is independent, or where neighbouring tiles have most of the misfit in
-/// common, as with dents and stuck feed; else what they have in common, as the rest is the sensor's.
-pub fn lasting_misfit(problem: &Problem, misfit: f64, tiles: &[TileEquation]) -> f64 {
-    const MOST: f64 = 0.5;
-    if problem.patches.cloud || problem.patches.common_noise == 1.0 {
-        return misfit;
-    }
-    let mut off = vec![0.0; problem.patches.list.len()];
-    for TileEquation { patch, equation: e, .. } in tiles {
-        off[*patch] = e.residual * e.cosine * tukey(e.residual * e.residual / e.variance);
-    }
-    let beside = |i: usize, direction: usize| match problem.patches.neighbours[i][direction] {
-        NONE => None,
-        j => Some(j as usize),
-    };
-    let (mut product, mut pairs) = (0.0, 0.0); // of tiles two apart
-    for i in tiles.iter().map(|t| t.patch) {
-        for j in [RIGHT, DOWN].into_iter().filter_map(|to| beside(beside(i, to)?, to)).filter(|&j| off[j] != 0.0) {
-            product += off[i] * off[j];
-            pairs += 1.0;
-        }
-    }
-    let common = f64::max(product / f64::max(pairs, 1.0), 0.0).sqrt();
-    if common > MOST * misfit { misfit } else { common }
-}
-
 /// Whether the residuals show that the silo is oval: the two parts of its ovality against their covariance.
 pub fn shows_ovality(problem: &Problem, fit: &Fit, tiles: &mut [TileEquation], std: f64) -> bool {
     let mut system = System::with_prior(problem.prior, fit).with_ovality(std);
@@ -147,9 +135,9 @@ const RELIEF_SHARE: f64 = 0.3;
 /// Root-mean-square relief across the wall, metres; 0 where the pixels' scatter needs none beside the noise.
 pub fn relief(tiles: &[TileEquation]) -> f64 {
     let (mut weights, mut sum) = (0.0, 0.0);
-    for TileEquation { equation: e, noise, scatter, count, .. } in tiles {
+    for TileEquation { equation: e, expected, scatter, count, .. } in tiles {
         let across = e.cosine * e.cosine;
-        let noise = noise * count * across;
+        let noise = expected * across;
         let weight = count / (2.0 * noise * noise).max(1e-24); // of an estimated variance
         weights += weight;
         sum += weight * (scatter * scatter * across - noise);
@@ -165,8 +153,8 @@ pub fn relief(tiles: &[TileEquation]) -> f64 {
 pub fn relief_beside_noise(tiles: &[TileEquation]) -> f64 {
     let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
     let rows = tiles.iter().map(|TileEquation { equation: e, noise, scatter, count, .. }| {
-        let (d2, expected) = (e.jacobian[8] * e.jacobian[8], noise * count);
-        let weight = count / (2.0 * expected * expected).max(1e-24); // of an estimated variance
+        let (d2, single) = (e.jacobian[8] * e.jacobian[8], noise * count);
+        let weight = count / (2.0 * single * single).max(1e-24); // of an estimated variance
         (Vector4::new(1.0, d2, d2 * d2, 1.0 / (e.cosine * e.cosine)), scatter * scatter, weight)
     });
     for (row, variance, weight) in rows.clone() {

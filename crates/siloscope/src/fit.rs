@@ -5,9 +5,9 @@ use crate::Vec3;
 use crate::bow::bow_uncertainty;
 use crate::cloud::cloud_patches;
 use crate::coarse::{Settled, coarse_fit, drop_film, may_be_feed, without_bare_parts};
-use crate::covariance::{
-    lasting_misfit, relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened,
-};
+use crate::common::lasting_misfit;
+use crate::covariance::{relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened};
+use crate::grain::relief_with_grain;
 use crate::known_wall::{KnownWall, confirmed};
 use crate::parts::change_without_a_part;
 use crate::patches::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
@@ -144,7 +144,9 @@ fn measured(
         (_, equations) = on_pixels(problem, image, &mut fit, &wall, Some(noise), Looks::Usual);
     }
     clock.lap("pixels");
-    let result = finish(&problem, fit, &mut equations, (evidence, known), know.error.noise.is_some());
+    let relief = if know.error.noise.is_some() { relief(&equations) } else { relief_beside_noise(&equations) };
+    let relief = relief_with_grain(&problem, image, &fit, &equations, relief);
+    let result = finish(&problem, fit, &mut equations, (evidence, known), relief);
     clock.lap("covariance");
     result
 }
@@ -236,7 +238,8 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
     fit.surface = without_bare_parts(&problem, &fit, &wall);
     let mut equations = patch_equations(&problem, &fit, &wall);
-    let mut result = match finish(&problem, fit, &mut equations, (evidence, known), false) {
+    let relief = relief_beside_noise(&equations);
+    let mut result = match finish(&problem, fit, &mut equations, (evidence, known), relief) {
         Ok(found) => found,
         Err(refusal) => return Ok(Err(refusal)),
     };
@@ -287,7 +290,7 @@ fn finish(
     mut fit: Fit,
     tiles: &mut [TileEquation],
     (evidence, wall): (WallEvidence, KnownWall),
-    noise_is_known: bool,
+    relief: f64,
 ) -> Outcome {
     let base = parameters_of(&fit.surface, &fit.bias);
     let system = solve_equations(problem, &mut fit, tiles, 4).ok_or(Refusal::PoorlyDetermined)?;
@@ -296,8 +299,7 @@ fn finish(
     let joint = if problem.patches.cloud { system } else { system.with_ovality(OVALITY_STD) };
     let (model, jointly_free) = joint.covariance(&fit).ok_or(Refusal::PoorlyDetermined)?;
     let mut covariance = widened(problem, &model, &joint, (tiles, &pulls));
-    let relief = if noise_is_known { relief(tiles) } else { relief_beside_noise(tiles) };
-    let lasting = lasting_misfit(problem, fit.misfit, tiles);
+    let lasting = lasting_misfit(problem.patches, fit.misfit, tiles);
     let form = form(lasting, free[OVALITY]);
     let off_by = |form: f64| relief_uncertainty(&joint, &fit, tiles, (relief, form));
     let film = if evidence.stuck > DENTED { off_by(form.max(FILM_FORM)) } else { Information::zeros() };

@@ -212,7 +212,14 @@ mod tests {
                 z,
                 across: [p.x, p.y],
             };
-            TileEquation { patch: i, equation, noise: NOISE * NOISE, scatter: NOISE, count: 64.0 }
+            TileEquation {
+                patch: i,
+                equation,
+                noise: NOISE * NOISE,
+                expected: 64.0 * NOISE * NOISE,
+                scatter: NOISE,
+                count: 64.0,
+            }
         };
         let mut tiles: Vec<TileEquation> = (0..3000).map(of_point).collect();
         for _ in 0..8 {

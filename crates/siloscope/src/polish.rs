@@ -1,7 +1,7 @@
 //! The last steps of the fit: residuals of pixels, not tiles, against the exact wall.
 
 use crate::axis::{MEDIAN_OF_CHI_SQUARE, median};
-use crate::patches::{DepthImage, noise_from_scatter};
+use crate::patches::{DepthImage, Patch, noise_from_scatter};
 use crate::pixels::{Sampling, tile_residual};
 use crate::refine::{Equation, Fit, Problem, System, tukey, tukey_slope};
 use crate::sensor::NoiseLaw;
@@ -16,6 +16,8 @@ pub struct TileEquation {
     pub equation: Equation,
     /// Variance of the residual by the noise alone.
     pub noise: f64,
+    /// Variance of a single pixel that the noise law expects; some tiles have more.
+    pub expected: f64,
     /// Scatter of the pixels about the tile's mean, metres along the ray.
     pub scatter: f64,
     /// Number of its pixels.
@@ -70,19 +72,27 @@ pub fn pixel_equations(
     let tile = |patch: usize| {
         let (d, _) = placed.depth(&problem.patches.list[patch].q);
         let equation = problem.equation_at(fit, &placed, patch, d)?;
-        let count = problem.patches.list[patch].count;
+        let Patch { count, scatter, .. } = problem.patches.list[patch];
         let misfit = fit.misfit / equation.cosine;
-        let single = (equation.variance - misfit * misfit).max(0.0) * count;
+        let expected = (equation.variance - misfit * misfit).max(0.0) * count;
+        let single = noisier(expected, scatter);
         let sampling = Sampling { stride, reach: 4.0 * (single.sqrt() + reach * misfit) };
         let seen = tile_residual(image, problem.patches, (patch, equation.part), &placed, &fit.bias, sampling);
         let enough = seen.count * stride as f64 >= 0.5 * count;
         let noise = single / seen.count;
         let equation = Equation { residual: seen.mean, variance: noise, ..equation };
-        enough.then_some(TileEquation { patch, equation, noise, scatter: seen.scatter, count: seen.count })
+        enough.then_some(TileEquation { patch, equation, noise, expected, scatter: seen.scatter, count: seen.count })
     };
     let mut equations = Vec::with_capacity(wall.len() / tiles);
     equations.extend((0..wall.len()).filter(|&i| wall[i]).step_by(tiles).filter_map(tile));
     equations
+}
+
+/// Variance of a tile's pixels: the expected one, or their own where that is surely larger, as at grazing incidence.
+fn noisier(expected: f64, scatter: f64) -> f64 {
+    const SURELY: f64 = 1.5;
+    let own = scatter * scatter;
+    if own > SURELY * expected { own } else { expected }
 }
 
 /// Equations of a cloud's wall patches from their own means.
@@ -96,6 +106,7 @@ pub fn patch_equations(problem: &Problem, fit: &Fit, wall: &[bool]) -> Vec<TileE
             patch,
             equation: Equation { variance: noise, ..equation },
             noise,
+            expected: seen.scatter * seen.scatter,
             scatter: seen.scatter,
             count: seen.count,
         })
