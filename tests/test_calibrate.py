@@ -325,6 +325,16 @@ def test_the_papers_rule_is_the_mean_of_the_last_ten() -> None:
     assert found.counts["not-averaged"] == len(frames) - 10
 
 
+def test_frames_of_other_silos_disagree_and_vague_ones_leave_the_axis_open() -> None:
+    others = [located(random_scene(seed, Feed("gaussian", 0.2), sensor=ASTRA_S)) for seed in (40, 41, 42)]
+    assert calibrate(others).reason == "frames-disagree"
+    (sharp,) = sequence(1)
+    assert sharp.evidence is not None
+    wider = {name: 1e7 * getattr(sharp.evidence, name) for name in ("scatter", "noise")}
+    vague = replace(sharp, evidence=replace(sharp.evidence, **wider))
+    assert calibrate([vague] * 3).reason == "poorly-determined"
+
+
 def test_frames_that_show_no_wall_are_refused_and_told() -> None:
     full = [located(scene) for scene in discharge(SILO3, 2, 0.9, 0.85)]
     found = calibrate(full)

@@ -44,6 +44,9 @@ MAX_DIRECTION_STD = 0.02
 MAX_POSITION_STD = 0.05
 """Largest standard deviation of the axis' position that still is an answer, as a share of the silo's radius."""
 
+MANY = 0.25
+"""Share of the frames that are many when they disagree with the rest."""
+
 REASONS = {
     "no-frame-answers": (
         "none of the frames shows enough wall",
@@ -52,6 +55,10 @@ REASONS = {
     "frames-disagree": (
         "the frames' answers scatter too far to be of one camera in one silo",
         "check that all frames are of one camera in one silo, and what each of them says",
+    ),
+    "poorly-determined": (
+        "the frames agree, but together they show too little wall to fix the axis",
+        "go on with frames at a lower level, or turn the camera so that more of the wall is in view",
     ),
 }
 """Why there is no calibration: what it means, and what to try."""
@@ -394,7 +401,8 @@ def _stack(history: _History) -> Stack:
 def _by_information(history: _History, stack: Stack, fused: Fused, config: dict[str, Any]) -> Calibration:
     history = replace(history, records=_judged(history, fused))
     if not _determined(fused):
-        return _refused("frames-disagree", history, "information", config)
+        disagree = fused.excess > 1.0 or float((fused.weights < 0.5).mean()) > MANY
+        return _refused("frames-disagree" if disagree else "poorly-determined", history, "information", config)
     return _answer(history, stack, fused, config)
 
 
@@ -456,7 +464,7 @@ def _quality(history: _History, fused: Fused) -> tuple[str, ...]:
     holds = {
         "camera-moved": bool(history.moves),
         "few-frames": agreeing < 3,
-        "many-frames-disagree": float((fused.weights < 0.5).mean()) > 0.25,
+        "many-frames-disagree": float((fused.weights < 0.5).mean()) > MANY,
         "frames-scatter": fused.excess > 4.0,
         "scale-unknown": fused.scale_std > 0.0,
         "cone-not-seen": not seen[6],
