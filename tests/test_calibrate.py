@@ -325,6 +325,21 @@ def test_the_papers_rule_is_the_mean_of_the_last_ten() -> None:
     assert found.counts["not-averaged"] == len(frames) - 10
 
 
+def test_a_wrong_cone_is_left_out_where_most_frames_show_none() -> None:
+    silo1 = replace(scenario("silo1"), sensor=ASTRA_S)
+    cylinder = [located(scene) for scene in discharge(silo1, 8, 0.5, 0.3)]
+    wrong, *cones = [located(scene) for scene in discharge(silo1, 3, 0.1, 0.0)]
+    assert all(one.silo.apex is None for one in cylinder)
+    assert wrong.evidence is not None
+    shifted = wrong.evidence.parameters + np.where(np.isin(np.arange(12), [5, 6]), 0.05, 0.0)
+    wrong = replace(wrong, evidence=replace(wrong.evidence, parameters=shifted))
+    found = calibrate([*cylinder, wrong, *cones])
+    assert [record.weight > 0.0 for record in found.frames] == [True] * len(cylinder) + [False, True, True]
+    assert found.silo.apex is not None
+    assert found.silo_std.apex is not None
+    assert abs(found.silo.apex - silo1.silo.geometry.apex) < 3.0 * found.silo_std.apex
+
+
 def test_frames_of_other_silos_disagree_and_vague_ones_leave_the_axis_open() -> None:
     others = [located(random_scene(seed, Feed("gaussian", 0.2), sensor=ASTRA_S)) for seed in (40, 41, 42)]
     assert calibrate(others).reason == "frames-disagree"

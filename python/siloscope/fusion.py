@@ -209,12 +209,24 @@ def fuse(stack: Stack, earlier: Sums | None = None) -> Fused:
     """Robust fusion: the answer of the majority, then every frame weighed by how well it agrees."""
     base = earlier or Sums.nothing()
     everyone = np.ones((1, stack.count), bool)
-    found = _reweighted(stack, base, majority(stack, everyone, _starts(stack), base))
+    found = _reweighted(stack, base, _completed(stack, base, majority(stack, everyone, _starts(stack), base)))
     if (found[1] < 0.5).any():  # half of a few frames may agree by chance where each leaves much open: do all agree?
         other = _reweighted(stack, base, solve(stack, everyone.astype(float), base))
         found = min(found, other, key=lambda answer: _cost(stack, answer[0]))
     centre, weights, excess = found
     return _with_covariance(stack, weights, base, centre[0], excess)
+
+
+def _completed(stack: Stack, base: Sums, centre: Matrix) -> Matrix:
+    """A majority's answer; where it lacks what others that agree with it have seen, the answer of most of those."""
+    lacking = ~np.isfinite(centre[0]) & stack.seen.any(axis=0)
+    near = agreement(deviation(stack.distances(centre)[0], stack.dof)) > 0.0
+    fuller = near & stack.seen[:, lacking].all(axis=1)
+    if not lacking.any() or not fuller.any():
+        return centre
+    numbers = np.flatnonzero(fuller)
+    starts = numbers[np.unique(np.linspace(0, len(numbers) - 1, STARTS).round().astype(np.intp))]
+    return majority(stack, fuller[None], starts, base)
 
 
 def _cost(stack: Stack, centre: Matrix) -> float:
@@ -226,12 +238,12 @@ def _cost(stack: Stack, centre: Matrix) -> float:
 def _reweighted(stack: Stack, base: Sums, centre: Matrix) -> tuple[Matrix, Vector, float]:
     """The answer near a first one, with each frame weighed by how well it agrees; the weights, and the excess."""
     weights, excess = np.ones(stack.count), 1.0
-    for _ in range(30):
+    for again in range(30):
         squared, counts = stack.distances(centre)[0], weights > 0.0
         excess = _excess(squared[counts], stack.dof[counts])
         new = agreement(deviation(squared / excess, stack.dof))
         centre = solve(stack, new[None], base)
-        settled = np.allclose(new, weights, atol=1e-9)
+        settled = again and np.allclose(new, weights, atol=1e-9)  # at first nothing has been weighed yet
         weights = new
         if settled:
             break
