@@ -15,7 +15,7 @@ import pytest
 
 from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, _core, calibrate, locate, sensors
 from siloscope.cli import main
-from siloscope.fusion import LENGTHS, SCALE, Stack
+from siloscope.fusion import LENGTHS, SCALE, Stack, sums
 from siloscope.paper.scenarios import random_scene, scenario
 from siloscope.scene import ASTRA_S, Feed, Scene, discharge
 from siloscope.straight import straightened
@@ -323,6 +323,25 @@ def test_the_papers_rule_is_the_mean_of_the_last_ten() -> None:
     means = [np.mean([getattr(f, name) for f in frames[-10:]]) for name in ("r_x", "r_y", "t_x", "t_y")]
     np.testing.assert_allclose([found.pose.r_x, found.pose.r_y, found.pose.t_x, found.pose.t_y], means, rtol=1e-14)
     assert found.counts["not-averaged"] == len(frames) - 10
+
+
+def test_what_frames_share_is_bounded_whatever_they_share() -> None:
+    draw = np.random.default_rng(5)
+    parts = draw.normal(0.0, 1.0, (8, 12)) * 10.0 ** draw.uniform(0.0, 3.0, (8, 1))
+    stack = Stack([e.evidence for e in sequence() if e.evidence])
+    stack.shared = np.einsum("ni,nj->nij", parts, parts)
+    weights = draw.uniform(0.0, 1.0, 8)
+    total = sums(stack, weights, np.zeros(12))
+    bound = total.weight * total.shared
+    together = (weights[:, None] * parts * draw.choice([-1.0, 1.0], (8, 1))).sum(axis=0)
+    assert np.linalg.eigvalsh(bound - np.outer(together, together)).min() > -1e-9 * np.trace(bound)
+    assert np.trace(bound) < 0.7 * weights.sum() * np.einsum("n,nii->", weights, stack.shared)
+    stack.shared[:] = stack.shared[0]
+    alike = sums(stack, weights, np.zeros(12))
+    np.testing.assert_allclose(alike.weight * alike.shared, weights.sum() ** 2 * stack.shared[0], rtol=1e-12)
+    before = sums(stack.take(slice(0, 5)), weights[:5], np.zeros(12))
+    after = sums(stack.take(slice(5, 8)), weights[5:], np.zeros(12), before)
+    np.testing.assert_allclose(after.shared, alike.shared, rtol=1e-12)
 
 
 def test_a_wrong_cone_is_left_out_where_most_frames_show_none() -> None:

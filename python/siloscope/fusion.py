@@ -35,6 +35,9 @@ STARTS = 12
 PIECE = 24
 """Frames added up at a time."""
 
+TYPICAL = np.array([1e-3, 1e-3, 5e-3, 5e-3, 5e-3, 5e-3, 2e-2, 5e-3, 1e-2, 5e-3, 1e-3, 1e-3])
+"""Typical deviations of the parameters, in whose units the sizes of what frames share are compared."""
+
 UPPER = np.triu_indices(SIZE)
 """Rows and columns of a symmetric matrix' upper triangle."""
 
@@ -46,7 +49,8 @@ Matrix = NDArray[np.float64]
 class Sums:
     """Frames added up about `origin` (12,): what is kept of frames whose own evidence is not.
 
-    `information` is Σ w Λ, `pull` Σ w (Λ (θ - origin) - g), `noise` Σ w² N, `shared` Σ w E, `weight` Σ w.
+    `information` is Σ w Λ, `pull` Σ w (Λ (θ - origin) - g), `noise` Σ w² N, `weight` Σ w; and `weight`
+    times `shared` is what the frames may share.
     """
 
     origin: Vector
@@ -295,12 +299,26 @@ def sums(stack: Stack, weights: Vector, origin: Vector, base: Sums | None = None
         information[0] + start.information,
         pull[0] + start.pull + start.information @ (start.origin - origin),
         np.einsum("n,nij->ij", weights**2, stack.noise) + start.noise,
-        np.einsum("n,nij->ij", weights, stack.shared) + start.shared,
+        _in_common(stack, weights, start) / max(float(weights.sum()) + start.weight, 1e-300),
         float(weights.sum()) + start.weight,
         stack.count + start.frames,
         prior,
         mean[0],
     )
+
+
+def _in_common(stack: Stack, weights: Vector, base: Sums) -> Matrix:
+    """Covariance (12, 12) of what the frames may share, added up, however much of it they do share.
+
+    For parts ``b`` with covariances E, ``(Σ b)(Σ b)ᵀ ≤ Σ E/α`` for any shares α > 0 of 1 (Cauchy and Schwarz). Shares
+    as large as the parts themselves keep a few vague frames from standing for all.
+    """
+    sizes = weights * np.sqrt(np.einsum("nii,i->n", stack.shared, TYPICAL**2))
+    earlier = base.weight * base.shared
+    before = float(np.sqrt(np.einsum("ii,i", earlier, TYPICAL**2)))
+    ratios = np.divide(weights**2, sizes, out=np.zeros_like(sizes), where=sizes > 0.0)
+    total: Matrix = (before + sizes.sum()) * (np.einsum("n,nij->ij", ratios, stack.shared) + earlier / (before or 1.0))
+    return total
 
 
 def deviation(squared: Vector, dof: NDArray[np.int_]) -> Vector:
@@ -377,7 +395,7 @@ def _origin(stack: Stack, base: Sums) -> Vector:
 
 
 def _with_covariance(stack: Stack, weights: Vector, base: Sums, centre: Vector, excess: float) -> Fused:
-    """Sandwich ``P (Π + c² (Σ w² N + Σw · Σ w E)) P``: noise averages down, what frames may share does not."""
+    """Sandwich ``P (Π + c² (Σ w² N + E)) P``: noise averages down, what frames may share (`_in_common`) does not."""
     systems, _, origin, solved = _systems(stack, weights[None], base)
     system, solved = systems[0], solved[0]
     total = sums(stack, weights, origin, base)
