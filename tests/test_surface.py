@@ -103,8 +103,8 @@ def test_noise_that_neighbouring_pixels_share_hides_no_wall() -> None:
     assert max(gap(f, s) for f, s in zip(found, scenes, strict=True) if f.ok) < 30.0
 
 
-@pytest.mark.parametrize("flaw", [{"incidence_gain": 0.2}, {"incidence_gain": 1.0}, {"correlation": 0.3}])
-def test_deviations_are_true_where_the_noise_is_another_than_the_profile_says(flaw: dict[str, float]) -> None:
+@pytest.mark.parametrize("flaw", [{"incidence_gain": 0.2}, {"incidence_gain": 1.0}])
+def test_deviations_are_true_where_the_noise_grows_with_the_incidence(flaw: dict[str, float]) -> None:
     ratios = []
     for seed in (3001, 3002, 3003):
         scene = random_scene(seed, Feed("gaussian", 0.2), sensor=replace(ASTRA_S, **flaw))

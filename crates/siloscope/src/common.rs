@@ -29,9 +29,12 @@ pub fn variance_of_neighbours(patches: &Patches, tiles: &[TileEquation]) -> f64 
     along(RIGHT) * along(DOWN)
 }
 
-/// How much of the misfit is the wall's, metres across it: what tiles two apart have in common. The rest is the sensor's.
+/// How much of the misfit is the wall's or a lasting warp's, metres across the wall.
+///
+/// All of it where neighbouring pixels' noise is independent, as what is warped over many tiles is mostly evened out into
+/// the fit and leaves less in the residuals than it does; else what tiles two apart have in common, as the rest is noise.
 pub fn lasting_misfit(patches: &Patches, misfit: f64, tiles: &[TileEquation]) -> f64 {
-    if patches.cloud {
+    if patches.cloud || patches.common_noise == 1.0 {
         return misfit;
     }
     let across = OfTiles::new(patches, tiles, |tile| {
@@ -94,6 +97,7 @@ mod tests {
         let (rays, depth): (Vec<_>, _) = ((0..width * height).map(ray).collect(), vec![2.0f32; width * height]);
         let patches = tile_patches(&DepthImage { width, height, rays: &rays, depth: &depth }, None);
         assert_eq!(patches.list.len(), SIDE * SIDE);
+        let patches = Patches { common_noise: 2.0, ..patches };
         let equation = |i: usize| {
             let (column, row) = patches.list[i].tile;
             let residual = residual(column as usize, row as usize);
