@@ -17,8 +17,6 @@ from siloscope.sensors import SensorProfile
 from siloscope.surface import fit_depth, reasons
 
 NAMES = ("silo1", "silo2", "silo3")
-
-
 POSE = ("r_x", "r_y", "t_x", "t_y")
 
 

@@ -36,7 +36,8 @@ PIECE = 24
 """Frames added up at a time."""
 
 TYPICAL = np.array([1e-3, 1e-3, 5e-3, 5e-3, 5e-3, 5e-3, 2e-2, 5e-3, 1e-2, 5e-3, 1e-3, 1e-3])
-"""Typical deviations of the parameters, in whose units the sizes of what frames share are compared."""
+"""Typical deviations of the parameters (rad, m, and those without a unit; the quadratic bias 1/m): what frames share is
+compared in these units."""
 
 UPPER = np.triu_indices(SIZE)
 """Rows and columns of a symmetric matrix' upper triangle."""

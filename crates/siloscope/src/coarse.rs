@@ -6,7 +6,7 @@ use crate::refine::{Fit, Prior, Problem};
 use crate::refusal::Refusal;
 use crate::sensor::{DepthBias, NoiseLaw};
 use crate::start::{Oriented, Start, View, other_part, starts, steeper_cone};
-use crate::surface::{Part, PlacedSurface, Reach, SiloSurface};
+use crate::surface::{Part, PlacedSurface, Reach};
 use crate::taper::cone_instead;
 use crate::verdict::{WallEvidence, wall_evidence};
 use crate::vertex::is_covered;
@@ -24,6 +24,8 @@ pub struct Settled {
     pub wall: Vec<bool>,
     /// What they look like.
     pub evidence: WallEvidence,
+    /// The part of which there are hardly any: it is left out once it has told what it can.
+    pub bare: Option<Part>,
 }
 
 /// Refines every start value on a few patches; the likeliest that stands up to the evidence is refined on more.
@@ -126,7 +128,8 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
     let mut evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
     evidence.stuck = stuck(problem, &fit, &wall);
     judge(&evidence, fit.inside, problem.patches.cloud)?;
-    Ok(Settled { fit, wall, evidence })
+    let bare = bare_part(problem, &fit, &wall);
+    Ok(Settled { fit, wall, evidence, bare })
 }
 
 /// Whether the cone could as well be feed.
@@ -220,21 +223,21 @@ pub(crate) fn likelihood(problem: &Problem, fit: &Fit, stride: usize) -> f64 {
     fit.weights.iter().enumerate().step_by(stride).map(gain).sum()
 }
 
-/// The surface without a part of which hardly any wall patch is left: its parameters would be undetermined.
-pub fn without_bare_parts(problem: &Problem, fit: &Fit, wall: &[bool]) -> SiloSurface {
+/// The part of which hardly any wall patch is left, so that its parameters would be undetermined.
+fn bare_part(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Part> {
     const ENOUGH: usize = 12;
-    let (placed, surface) = (PlacedSurface::new(fit.surface), fit.surface);
+    let placed = PlacedSurface::new(fit.surface);
     let (mut cylinder, mut cone) = (0, 0);
     for contact in (0..wall.len()).filter(|&i| wall[i]).filter_map(|i| problem.contact(fit, &placed, i)) {
         *(if contact.part == Part::Cylinder { &mut cylinder } else { &mut cone }) += 1;
         if cylinder.min(cone) >= ENOUGH {
-            return surface;
+            return None;
         }
     }
     match (cylinder >= ENOUGH, cone >= ENOUGH) {
-        (true, false) => SiloSurface { cone: None, ..surface },
-        (false, true) => SiloSurface { radius: None, ..surface },
-        _ => surface,
+        (true, false) => Some(Part::Cone),
+        (false, true) => Some(Part::Cylinder),
+        _ => None,
     }
 }
 

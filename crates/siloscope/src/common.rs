@@ -41,8 +41,8 @@ pub fn lasting_misfit(patches: &Patches, misfit: f64, tiles: &[TileEquation]) ->
         let e = &tile.equation;
         e.residual * e.cosine * tukey(e.residual * e.residual / e.variance)
     });
-    let [(right, across_pairs), (down, down_pairs)] = [RIGHT, DOWN].map(|direction| across.product(direction, 2));
-    let product = (right * across_pairs + down * down_pairs) / f64::max(across_pairs + down_pairs, 1.0);
+    let [(right, right_pairs), (down, down_pairs)] = [RIGHT, DOWN].map(|direction| across.product(direction, 2));
+    let product = (right * right_pairs + down * down_pairs) / f64::max(right_pairs + down_pairs, 1.0);
     let common = product.max(0.0).sqrt();
     if common > MOST * misfit { misfit } else { common.max(LEAST * misfit) }
 }

@@ -4,7 +4,7 @@ use crate::Result;
 use crate::Vec3;
 use crate::bow::bow_uncertainty;
 use crate::cloud::cloud_patches;
-use crate::coarse::{Settled, coarse_fit, drop_film, may_be_feed, without_bare_parts};
+use crate::coarse::{Settled, coarse_fit, drop_film, may_be_feed};
 use crate::common::lasting_misfit;
 use crate::covariance::{relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened};
 use crate::grain::relief_with_grain;
@@ -118,14 +118,14 @@ fn measured(
     clock: &mut Clock,
 ) -> Outcome {
     let mut known = KnownWall::of(&found);
-    let Settled { mut fit, wall, evidence } = found;
+    let Settled { mut fit, wall, evidence, bare } = found;
     let round = fit.surface.ovality == [0.0; 2];
     let prior = if round { problem.prior.clone() } else { problem.prior.with_ovality() };
     let problem = Problem { prior: &prior, ..problem };
     if let (Some((radius, _)), true) = (know.radius, prior.bias_std[1] > 0.0) {
         fit.rescale_to(radius); // few patches of the cylinder tell the scale, though they leave its radius open
     }
-    fit.surface = without_bare_parts(&problem, &fit, &wall);
+    fit.surface = fit.surface.without(bare);
     drop_film(&problem, &mut fit, &wall);
     known.drop_parts_without(&fit.surface);
     let (noise, mut equations) = on_pixels(problem, image, &mut fit, &wall, know.error.noise, looks);
@@ -233,10 +233,10 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
         Err(refusal) => return Ok(Err(refusal)),
     };
     let known = KnownWall::of(&found);
-    let Settled { mut fit, wall, evidence } = found;
+    let Settled { mut fit, wall, evidence, bare } = found;
     clock.lap("coarse fit");
     let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
-    fit.surface = without_bare_parts(&problem, &fit, &wall);
+    fit.surface = fit.surface.without(bare);
     let mut equations = patch_equations(&problem, &fit, &wall);
     let relief = relief_beside_noise(&equations);
     let mut result = match finish(&problem, fit, &mut equations, (evidence, known), relief) {

@@ -36,13 +36,13 @@ pub fn relief_with_grain(problem: &Problem, image: &DepthImage, fit: &Fit, tiles
         let sketch = asked.iter().step_by(asked.len().div_ceil(SKETCH).max(1));
         let least = FEWEST.max((LEAST_SHARE * sketch.len() as f64) as usize);
         let found: Vec<([f64; 2], f64)> = sketch.filter_map(|tile| in_common(problem, image, &placed, tile)).collect();
-        match (asked.len() < FEWEST, found.len() < least) {
-            (true, _) => 0.0,
-            (false, true) => relief,
-            (false, false) => {
-                let means = [0, 1].map(|k| sure_mean(&found.iter().map(|(both, w)| (both[k], *w)).collect::<Vec<_>>()));
-                (means[0].max(means[1]) / COMMON).sqrt()
-            }
+        if asked.len() < FEWEST {
+            0.0
+        } else if found.len() < least {
+            relief
+        } else {
+            let means = [0, 1].map(|k| sure_mean(&found.iter().map(|(both, w)| (both[k], *w)).collect::<Vec<_>>()));
+            (means[0].max(means[1]) / COMMON).sqrt()
         }
     };
     relief.min(of_part(Part::Cylinder).max(of_part(Part::Cone)))

@@ -3,7 +3,7 @@
 //! Only the search is spared. What is found stands up to the same evidence as a wall found from nothing, and it must
 //! confirm the known wall: whatever is new, lost, moved, or hard to see sends the frame back to the search.
 
-use crate::coarse::{Settled, settled, with_free_size, without_bare_parts};
+use crate::coarse::{Settled, settled, with_free_size};
 use crate::patches::Patches;
 use crate::refine::{Fit, Prior, Problem};
 use crate::sensor::{DepthBias, NoiseLaw};
@@ -48,10 +48,9 @@ pub fn confirmed(
         Problem { patches, noise, prior, pixel }.refine(&mut fit, 3, 4, 0.2);
         patches.unbias_normals(&fit.bias);
     }
-    let problem = Problem { patches, noise, prior, pixel };
-    let found = settled(&problem, fit).ok()?;
+    let found = settled(&Problem { patches, noise, prior, pixel }, fit).ok()?;
     let rough = known.misfit.max(found.fit.misfit) > MOST_MISFIT * found.fit.surface.size();
-    let same = known.is_same(&without_bare_parts(&problem, &found.fit, &found.wall));
+    let same = known.is_same(&found.fit.surface.without(found.bare));
     (!(bends && rough) && found.evidence.share > LEAST_SHARE && same).then_some(found)
 }
 

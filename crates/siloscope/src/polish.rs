@@ -16,7 +16,7 @@ pub struct TileEquation {
     pub equation: Equation,
     /// Variance of the residual by the noise alone.
     pub noise: f64,
-    /// Variance of a single pixel that the noise law expects; some tiles have more.
+    /// Variance of a single pixel along the ray, m², that the noise law expects (a cloud's own); some tiles have more.
     pub expected: f64,
     /// Scatter of the pixels about the tile's mean, metres along the ray.
     pub scatter: f64,

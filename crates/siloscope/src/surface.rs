@@ -82,6 +82,15 @@ impl SiloSurface {
         self.radius.or(self.cone.map(|c| 0.5 * c.slope * c.apex.abs())).unwrap_or(1.0)
     }
 
+    /// The surface without a part.
+    pub fn without(self, part: Option<Part>) -> Self {
+        match part {
+            Some(Part::Cylinder) => Self { radius: None, ..self },
+            Some(Part::Cone) => Self { cone: None, ..self },
+            None => self,
+        }
+    }
+
     /// Whether it has the same parts as another one, and in the same place.
     pub fn is_near(&self, other: &Self, reach: &Reach) -> bool {
         let size = other.size();
