@@ -6,7 +6,7 @@ import io
 import json
 import struct
 import zlib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -60,13 +60,34 @@ def chunk(kind: bytes, data: bytes) -> bytes:
 def png(width: int, height: int, rows: bytes, bits: int = 16, colour: int = 0, interlaced: int = 0) -> bytes:
     """A PNG of filtered rows, whatever its header says of them."""
     header = struct.pack(">IIBBBBB", width, height, bits, colour, 0, 0, interlaced)
-    body = [chunk(b"IHDR", header), chunk(b"IDAT", zlib.compress(rows)), chunk(b"IEND", b"")]
-    return b"\x89PNG\r\n\x1a\n" + b"".join(body)
+    return png_of(chunk(b"IHDR", header), chunk(b"IDAT", zlib.compress(rows)), chunk(b"IEND", b""))
+
+
+def png_of(*chunks: bytes) -> bytes:
+    """A PNG of these chunks."""
+    return b"\x89PNG\r\n\x1a\n" + b"".join(chunks)
 
 
 def unfiltered(raw: NDArray[np.uint16]) -> bytes:
     """Rows of a 16-bit PNG with filter 0."""
     return b"".join(b"\0" + row.astype(">u2").tobytes() for row in raw)
+
+
+def filtered(raw: NDArray[np.uint16], filters: Sequence[int]) -> bytes:
+    """Rows of a 16-bit PNG, each with its filter, as the specification defines them (section 9.2)."""
+    rows, above = [], [0] * (2 * raw.shape[1])
+    for kind, row in zip(filters, raw.astype(">u2"), strict=True):
+        line = list(row.tobytes())
+        left, corner = [0, 0, *line[:-2]], [0, 0, *above[:-2]]
+        foretold = (_foretold(kind, *neighbours) for neighbours in zip(left, above, corner, strict=True))
+        rows.append(bytes([kind, *((byte - guess) % 256 for byte, guess in zip(line, foretold, strict=True))]))
+        above = line
+    return b"".join(rows)
+
+
+def _foretold(kind: int, a: int, b: int, c: int) -> int:
+    nearest = min((a, b, c), key=lambda value: abs(a + b - c - value))
+    return (0, a, b, (a + b) // 2, nearest)[kind]
 
 
 def interlaced_png(raw: NDArray[np.uint16]) -> bytes:

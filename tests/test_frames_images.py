@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import io
 import struct
+import zlib
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
+from hypothesis import strategies as st
 from hypothesis.extra.numpy import array_shapes, arrays
 from numpy.typing import NDArray
 from PIL import Image
@@ -27,7 +29,59 @@ def test_png_decodes_as_pillow_encodes(raw: NDArray[np.uint16]) -> None:
     assert np.array_equal(_core.decode_png16(made.interlaced_png(raw)).reshape(raw.shape), raw)
 
 
+@given(arrays(np.uint16, array_shapes(min_dims=2, max_dims=2, max_side=12)), st.data())
+def test_every_filter_of_png(raw: NDArray[np.uint16], data: st.DataObject) -> None:
+    filters = data.draw(st.lists(st.integers(0, 4), min_size=len(raw), max_size=len(raw)))
+    file = made.png(raw.shape[1], len(raw), made.filtered(raw, filters))
+    assert np.array_equal(np.asarray(Image.open(io.BytesIO(file))), raw)
+    assert np.array_equal(_core.decode_png16(file).reshape(raw.shape), raw)
+
+
 PNG = made.MAKERS["depth.png"]()
+
+
+@given(st.integers(0, len(PNG) - 1), st.integers(1, 255))
+def test_a_damaged_byte_of_a_png_never_changes_a_pixel(at: int, change: int) -> None:
+    damaged = bytearray(PNG)
+    damaged[at] ^= change
+    try:
+        pixels = _core.decode_png16(bytes(damaged))
+    except ValueError:
+        return
+    assert np.array_equal(pixels, made.RAW.ravel())
+
+
+HEAD = made.chunk(b"IHDR", struct.pack(">IIBBBBB", 64, 48, 16, 0, 0, 0, 0))
+DATA = zlib.compress(made.unfiltered(made.RAW))
+WHOLE, END = made.chunk(b"IDAT", DATA), made.chunk(b"IEND", b"")
+GOOD_CHUNKS = {
+    "in parts": [HEAD, *(made.chunk(b"IDAT", part) for part in (DATA[:99], b"", DATA[99:])), END],
+    "remarks": [HEAD, made.chunk(b"tEXt", b"who\0me"), WHOLE, made.chunk(b"tIME", bytes(7)), END],
+    "little known": [HEAD, made.chunk(b"sBIT", b"\x0c"), WHOLE, END],
+    "more behind": [HEAD, WHOLE, END, b"more"],
+}
+BAD_CHUNKS = {
+    "no end": [HEAD, WHOLE],
+    "no data": [HEAD, END],
+    "no header": [WHOLE, END],
+    "unknown and needed": [HEAD, made.chunk(b"ABCD", b""), WHOLE, END],
+    "sum of the chunk": [HEAD, WHOLE[:-1] + bytes([WHOLE[-1] ^ 1]), END],
+    "sum of the data": [HEAD, made.chunk(b"IDAT", DATA[:-1] + bytes([DATA[-1] ^ 1])), END],
+    "unknown filter": [HEAD, made.chunk(b"IDAT", zlib.compress(b"\5" + made.unfiltered(made.RAW)[1:])), END],
+}
+
+
+@pytest.mark.parametrize("chunks", GOOD_CHUNKS.values(), ids=GOOD_CHUNKS.keys())
+def test_chunks_of_a_png(chunks: list[bytes]) -> None:
+    assert np.array_equal(_core.decode_png16(made.png_of(*chunks)), made.RAW.ravel())
+
+
+@pytest.mark.parametrize("chunks", BAD_CHUNKS.values(), ids=BAD_CHUNKS.keys())
+def test_chunks_that_do_not_make_a_png(chunks: list[bytes]) -> None:
+    with pytest.raises(ValueError, match=r"\w"):
+        _core.decode_png16(made.png_of(*chunks))
+
+
 BAD_PNG = {
     "8-bit": (made.png(8, 8, b"\0" * 72, bits=8), "8-bit grey PNG is a picture"),
     "colour": (made.png(8, 8, b"\0" * 8 * 49, bits=16, colour=2), "16-bit colour PNG is a picture"),

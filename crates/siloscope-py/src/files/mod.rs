@@ -3,6 +3,7 @@
 mod checksum;
 mod exr;
 mod lzf;
+mod plain_png;
 mod png;
 mod tiff;
 

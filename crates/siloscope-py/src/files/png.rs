@@ -1,5 +1,6 @@
 //! 16-bit grey PNG.
 
+use super::plain_png;
 use crate::convert::value_error;
 use numpy::PyArray1;
 use png::{BitDepth, ColorType, Decoder, Limits};
@@ -12,7 +13,8 @@ pub const BEST_DEFLATE_RATIO: usize = 1032;
 /// Decodes a 16-bit grey PNG into its pixels, row by row: uint16 array (H*W,). Raises `ValueError` naming the damage.
 #[pyfunction]
 pub fn decode_png16<'py>(py: Python<'py>, data: &[u8]) -> PyResult<Bound<'py, PyArray1<u16>>> {
-    let pixels = py.detach(|| png16(data)).map_err(value_error)?;
+    let most = data.len().saturating_mul(BEST_DEFLATE_RATIO / 2);
+    let pixels = py.detach(|| plain_png::decode(data, most).map_or_else(|| png16(data), Ok)).map_err(value_error)?;
     Ok(PyArray1::from_vec(py, pixels))
 }
 
