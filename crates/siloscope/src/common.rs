@@ -39,7 +39,7 @@ pub fn lasting_misfit(patches: &Patches, misfit: f64, tiles: &[TileEquation]) ->
     }
     let across = OfTiles::new(patches, tiles, |tile| {
         let e = &tile.equation;
-        e.residual * e.cosine * tukey(e.residual * e.residual / e.variance)
+        e.residual / tile.spread * tukey(e.residual * e.residual / e.variance)
     });
     let [(right, right_pairs), (down, down_pairs)] = [RIGHT, DOWN].map(|direction| across.product(direction, 2));
     let product = (right * right_pairs + down * down_pairs) / f64::max(right_pairs + down_pairs, 1.0);
@@ -111,6 +111,7 @@ mod tests {
             expected: 64e-6,
             scatter: 8e-3,
             count: 64.0,
+            spread: 1.0,
         };
         ask(&patches, &(0..patches.list.len()).map(tile).collect::<Vec<_>>())
     }

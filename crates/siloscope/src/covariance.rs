@@ -95,15 +95,14 @@ pub fn relief_uncertainty(
     tiles: &[TileEquation],
     (relief, form): (f64, f64),
 ) -> Information {
-    let off = (RELIEF_SHARE * relief).hypot(form);
-    if off == 0.0 {
+    if relief.max(form) == 0.0 {
         return Information::zeros();
     }
     let (mut pull, mut system) = (Parameters::zeros(), joint.prior_alone());
-    for TileEquation { equation: e, .. } in tiles {
+    for TileEquation { equation: e, spread, .. } in tiles {
         let weight = tukey(e.residual * e.residual / e.variance);
-        let across = off / e.cosine;
-        let blocked = Equation { variance: across * across * f64::from(BLOCK * BLOCK), ..*e };
+        let along = (RELIEF_SHARE * relief / e.cosine).hypot(form * spread);
+        let blocked = Equation { variance: along * along * f64::from(BLOCK * BLOCK), ..*e };
         system.add(&blocked, weight);
         pull += e.jacobian * (relief * (1.0 - e.cosine) / e.cosine * weight / blocked.variance);
     }

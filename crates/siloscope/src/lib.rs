@@ -26,6 +26,7 @@ pub mod grid;
 pub mod known_wall;
 pub mod labels;
 pub mod locate;
+mod misfit;
 pub mod nearest;
 pub mod neighbours;
 pub mod normals;

@@ -219,6 +219,7 @@ mod tests {
                 expected: 64.0 * NOISE * NOISE,
                 scatter: NOISE,
                 count: 64.0,
+                spread: 1.0,
             }
         };
         let mut tiles: Vec<TileEquation> = (0..3000).map(of_point).collect();

@@ -1,11 +1,12 @@
 //! The last steps of the fit: residuals of pixels, not tiles, against the exact wall.
 
 use crate::axis::{MEDIAN_OF_CHI_SQUARE, median};
+use crate::misfit::{misfit_of, misfit_to_start_from, spread_misfit};
 use crate::patches::{DepthImage, Patch, noise_from_scatter};
 use crate::pixels::{Sampling, tile_residual};
 use crate::refine::{Equation, Fit, Problem, System, tukey, tukey_slope};
 use crate::sensor::NoiseLaw;
-use crate::surface::{Parameters, Part, PlacedSurface};
+use crate::surface::{Parameters, PlacedSurface};
 
 /// The equation of one wall tile from its pixels.
 #[derive(Debug, Clone, Copy)]
@@ -22,6 +23,8 @@ pub struct TileEquation {
     pub scatter: f64,
     /// Number of its pixels.
     pub count: f64,
+    /// How far the residual may be off along this ray, as a multiple of the fit's misfit.
+    pub spread: f64,
 }
 
 /// One Gauss–Newton step on pixel residuals; returns the noise law, from the residuals themselves where none is known.
@@ -81,10 +84,20 @@ pub fn pixel_equations(
         let enough = seen.count * stride as f64 >= 0.5 * count;
         let noise = single / seen.count;
         let equation = Equation { residual: seen.mean, variance: noise, ..equation };
-        enough.then_some(TileEquation { patch, equation, noise, expected, scatter: seen.scatter, count: seen.count })
+        let spread = 1.0 / equation.cosine; // until all are there
+        enough.then_some(TileEquation {
+            patch,
+            equation,
+            noise,
+            expected,
+            scatter: seen.scatter,
+            count: seen.count,
+            spread,
+        })
     };
     let mut equations = Vec::with_capacity(wall.len() / tiles);
     equations.extend((0..wall.len()).filter(|&i| wall[i]).step_by(tiles).filter_map(tile));
+    spread_misfit(&mut equations);
     equations
 }
 
@@ -109,6 +122,7 @@ pub fn patch_equations(problem: &Problem, fit: &Fit, wall: &[bool]) -> Vec<TileE
             expected: seen.scatter * seen.scatter,
             scatter: seen.scatter,
             count: seen.count,
+            spread: 1.0 / equation.cosine,
         })
     };
     let mut equations: Vec<TileEquation> = (0..wall.len()).filter(|&i| wall[i]).filter_map(patch).collect();
@@ -184,46 +198,9 @@ impl TileEquation {
         tukey(residual * residual / variance) * residual / variance
     }
 
-    /// Puts a misfit of the wall into the variance.
+    /// Puts a misfit into the variance.
     pub fn allow(&mut self, misfit: f64) {
-        let along = misfit / self.equation.cosine;
+        let along = misfit * self.spread;
         self.equation.variance = self.noise + along * along;
     }
-}
-
-/// The misfit with which neither part of the wall is without weight: the step before may have gone too far for one that
-/// little is seen of, and what has no weight would never be fitted again.
-fn misfit_to_start_from(fit: &Fit, equations: &[TileEquation]) -> f64 {
-    const LOST: f64 = 0.1;
-    let needed = |part: Part| {
-        let of_part = || equations.iter().filter(|t| t.equation.part == part).copied();
-        let (count, weight) = of_part().fold((0.0, 0.0), |(count, weight), mut tile| {
-            tile.allow(fit.misfit);
-            (count + 1.0, weight + tukey(tile.equation.residual * tile.equation.residual / tile.equation.variance))
-        });
-        if weight < LOST * count { misfit_of(&of_part().collect::<Vec<_>>()) } else { 0.0 }
-    };
-    fit.misfit.max(needed(Part::Cylinder)).max(needed(Part::Cone))
-}
-
-/// How true a tile's mean is at best, metres: its pixels are held against a quadratic. A smaller misfit would take the
-/// rest for disagreement between tiles.
-const RESOLUTION: f64 = 1e-5;
-
-/// Misfit across the wall that the tiles' residuals need beside their noise.
-fn misfit_of(equations: &[TileEquation]) -> f64 {
-    let mut excess: Vec<f64> = Vec::with_capacity(equations.len());
-    let mut noise: Vec<f64> = Vec::with_capacity(equations.len());
-    for tile in equations {
-        let cosine = tile.equation.cosine;
-        excess.push((tile.equation.residual * cosine).abs());
-        noise.push(tile.noise * cosine * cosine);
-    }
-    if excess.is_empty() {
-        return 0.0;
-    }
-    let middle = excess.len() / 2;
-    let (_, &mut spread, _) = excess.select_nth_unstable_by(middle, f64::total_cmp);
-    let (_, &mut noise, _) = noise.select_nth_unstable_by(middle, f64::total_cmp);
-    ((1.4826 * spread).powi(2) - 1.2 * noise).max(0.0).sqrt().max(RESOLUTION)
 }
