@@ -12,7 +12,8 @@ struct Chunk<'a> {
     body: &'a [u8],
 }
 
-/// The pixels, row by row, or `None` if the file isn't exactly of the usual kind with all its checksums right.
+/// The pixels, row by row, or `None` if the file isn't exactly of the usual kind with all its checksums right and no more
+/// than `most_pixels`.
 ///
 /// Source: Portable Network Graphics specification (third edition), sections 5, 9 and 10.
 pub fn decode(data: &[u8], most_pixels: usize) -> Option<Vec<u16>> {
