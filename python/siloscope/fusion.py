@@ -39,6 +39,12 @@ TYPICAL = np.array([1e-3, 1e-3, 5e-3, 5e-3, 5e-3, 5e-3, 2e-2, 5e-3, 1e-2, 5e-3, 
 """Typical deviations of the parameters (rad, m, and those without a unit; the quadratic bias 1/m): what frames share is
 compared in these units."""
 
+SHARES = tuple(0.25**k for k in range(11))
+"""By how much less than fully what the frames say may count."""
+
+SAME_SIZE = 0.01
+"""Sizes of covariances that differ by no more than this share are the same: what the frames say counts fully then."""
+
 UPPER = np.triu_indices(SIZE)
 """Rows and columns of a symmetric matrix' upper triangle."""
 
@@ -218,8 +224,7 @@ def fuse(stack: Stack, earlier: Sums | None = None) -> Fused:
     if (found[1] < 0.5).any():  # half of a few frames may agree by chance where each leaves much open: do all agree?
         other = _reweighted(stack, base, solve(stack, everyone.astype(float), base))
         found = min(found, other, key=lambda answer: _cost(stack, answer[0]))
-    centre, weights, excess = found
-    return _with_covariance(stack, weights, base, centre[0], excess)
+    return _with_covariance(stack, *found[1:], base)
 
 
 def _completed(stack: Stack, base: Sums, centre: Matrix) -> Matrix:
@@ -374,12 +379,17 @@ def _product(weights: Matrix, rows: Matrix) -> Matrix:
     return total
 
 
-def _systems(stack: Stack, weights: Matrix, base: Sums) -> tuple[Matrix, Matrix, Vector, NDArray[np.bool_]]:
-    """Normal equations about an origin, and which parameters they determine; the others stay at the origin."""
+def _systems(
+    stack: Stack, weights: Matrix, base: Sums, share: float = 1.0
+) -> tuple[Matrix, Matrix, Vector, NDArray[np.bool_]]:
+    """Normal equations about an origin, and which parameters they determine; the others stay at the origin.
+
+    What the frames say counts by its `share` beside what was known before them.
+    """
     origin = _origin(stack, base)
     information, pull = _added(stack, weights, origin)
-    information = information + base.information
-    pull = pull + base.pull + base.information @ (base.origin - origin)
+    information = share * (information + base.information)
+    pull = share * (pull + base.pull + base.information @ (base.origin - origin))
     prior, mean = prior_of(stack, weights, base)
     solved = np.einsum("kii->ki", information) > 0.0
     solved[:, BIAS:] &= prior[BIAS:] > 0.0
@@ -395,18 +405,37 @@ def _origin(stack: Stack, base: Sums) -> Vector:
     return np.where(stack.seen.any(axis=0), stack.middle, base.origin)
 
 
-def _with_covariance(stack: Stack, weights: Vector, base: Sums, centre: Vector, excess: float) -> Fused:
-    """Sandwich ``P (Π + c² (Σ w² N + E)) P``: noise averages down, what frames may share (`_in_common`) does not."""
-    systems, _, origin, solved = _systems(stack, weights[None], base)
-    system, solved = systems[0], solved[0]
+def _with_covariance(stack: Stack, weights: Vector, excess: float, base: Sums) -> Fused:
+    """The answer by which the pose is known best, however much the frames count beside what was known before them.
+
+    Their information is that of their noise alone. Where what they share is larger, they would override what was known
+    as if they were sure of it. Any share gives an answer whose covariance is true; the one that is known best is taken.
+    """
+    origin = _origin(stack, base)
     total = sums(stack, weights, origin, base)
-    spread = np.diag(total.prior_information) + excess * (total.noise + total.weight * total.shared)
-    inverse = solved_by_frame(system, np.eye(SIZE))
-    covariance = inverse @ np.where(solved[:, None] & solved, spread, 0.0) @ inverse
+    spread = excess * (total.noise + total.weight * total.shared)
+    shares = SHARES if total.weight > 1.0 else SHARES[:1]  # one frame's answer is its own
+    found = [_sandwich(stack, weights, base, share, spread) for share in shares]
+    sizes = [float((np.diag(covariance)[:4] / TYPICAL[:4] ** 2).sum()) for _, covariance, _ in found]
+    best = next(k for k, size in enumerate(sizes) if size <= (1.0 + SAME_SIZE) * min(sizes))
+    centre, covariance, solved = found[best]
     scale_std = 0.0 if solved[SCALE] else stack.scale_std
-    covariance += _scale_share(centre, scale_std)
+    covariance = covariance + _scale_share(centre, scale_std)
     deviations = deviation(stack.distances(centre[None])[0] / excess, stack.dof)
     return Fused(centre, covariance, solved, weights, deviations, excess, scale_std)
+
+
+def _sandwich(
+    stack: Stack, weights: Vector, base: Sums, share: float, spread: Matrix
+) -> tuple[Vector, Matrix, NDArray[np.bool_]]:
+    """The answer of a share of what the frames say; its covariance ``P (Π + share² spread) P``; what it determines."""
+    systems, pulls, origin, determined = _systems(stack, weights[None], base, share)
+    system, solved = systems[0], determined[0]
+    centre = origin + solved_by_frame(system, pulls[0][:, None])[:, 0]
+    centre[:BIAS][~solved[:BIAS]] = np.nan
+    both = np.diag(prior_of(stack, weights[None], base)[0]) + share**2 * spread
+    inverse = solved_by_frame(system, np.eye(SIZE))
+    return centre, inverse @ np.where(solved[:, None] & solved, both, 0.0) @ inverse, solved
 
 
 def _scale_share(centre: Vector, std: float) -> Matrix:
