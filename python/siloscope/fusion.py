@@ -262,8 +262,12 @@ def _reweighted(stack: Stack, base: Sums, centre: Matrix) -> tuple[Matrix, Vecto
 
 def solve(stack: Stack, weights: Matrix, base: Sums) -> Matrix:
     """Answers (K, 12) to K weightings (K, N): ``(Σ w Λ + Π)⁻¹ (Σ w (Λ θ - g) + Π μ)``; NaN for what nobody saw."""
-    system, pull, origin, solved = _systems(stack, weights, base)
-    answers = origin + solved_by_frame(system, pull[:, :, None])[:, :, 0]
+    return _answers(*_systems(stack, weights, base))
+
+
+def _answers(system: Matrix, pull: Matrix, origin: Vector, solved: NDArray[np.bool_]) -> Matrix:
+    """Solutions (K, 12) of normal equations; NaN for what they don't determine, but for a bias, which is expected."""
+    answers: Matrix = origin + solved_by_frame(system, pull[:, :, None])[:, :, 0]
     answers[:, :BIAS][~solved[:, :BIAS]] = np.nan
     return answers
 
@@ -416,9 +420,8 @@ def _with_covariance(stack: Stack, weights: Vector, excess: float, base: Sums) -
     spread = excess * (total.noise + total.weight * total.shared)
     shares = SHARES if total.weight > 1.0 else SHARES[:1]  # one frame's answer is its own
     found = [_sandwich(stack, weights, base, share, spread) for share in shares]
-    sizes = [float((np.diag(covariance)[:4] / TYPICAL[:4] ** 2).sum()) for _, covariance, _ in found]
-    best = next(k for k, size in enumerate(sizes) if size <= (1.0 + SAME_SIZE) * min(sizes))
-    centre, covariance, solved = found[best]
+    sizes = np.array([(np.diag(covariance)[:4] / TYPICAL[:4] ** 2).sum() for _, covariance, _ in found])
+    centre, covariance, solved = found[int(np.argmax(sizes <= (1.0 + SAME_SIZE) * sizes.min()))]
     scale_std = 0.0 if solved[SCALE] else stack.scale_std
     covariance = covariance + _scale_share(centre, scale_std)
     deviations = deviation(stack.distances(centre[None])[0] / excess, stack.dof)
@@ -429,13 +432,11 @@ def _sandwich(
     stack: Stack, weights: Vector, base: Sums, share: float, spread: Matrix
 ) -> tuple[Vector, Matrix, NDArray[np.bool_]]:
     """The answer of a share of what the frames say; its covariance ``P (Π + share² spread) P``; what it determines."""
-    systems, pulls, origin, determined = _systems(stack, weights[None], base, share)
-    system, solved = systems[0], determined[0]
-    centre = origin + solved_by_frame(system, pulls[0][:, None])[:, 0]
-    centre[:BIAS][~solved[:BIAS]] = np.nan
+    equations = _systems(stack, weights[None], base, share)
+    system, solved = equations[0][0], equations[3][0]
     both = np.diag(prior_of(stack, weights[None], base)[0]) + share**2 * spread
     inverse = solved_by_frame(system, np.eye(SIZE))
-    return centre, inverse @ np.where(solved[:, None] & solved, both, 0.0) @ inverse, solved
+    return _answers(*equations)[0], inverse @ np.where(solved[:, None] & solved, both, 0.0) @ inverse, solved
 
 
 def _scale_share(centre: Vector, std: float) -> Matrix:
