@@ -401,7 +401,7 @@ def _stack(history: _History) -> Stack:
 def _by_information(history: _History, stack: Stack, fused: Fused, config: dict[str, Any]) -> Calibration:
     history = replace(history, records=_judged(history, fused))
     if not _determined(fused):
-        disagree = fused.excess > 1.0 or float((fused.weights < 0.5).mean()) > MANY
+        disagree = fused.excess > 1.0 or fused.disagreeing > MANY
         return _refused("frames-disagree" if disagree else "poorly-determined", history, "information", config)
     return _answer(history, stack, fused, config)
 
@@ -464,7 +464,7 @@ def _quality(history: _History, fused: Fused) -> tuple[str, ...]:
     holds = {
         "camera-moved": bool(history.moves),
         "few-frames": agreeing < 3,
-        "many-frames-disagree": float((fused.weights < 0.5).mean()) > MANY,
+        "many-frames-disagree": fused.disagreeing > MANY,
         "frames-scatter": fused.excess > 4.0,
         "scale-unknown": fused.scale_std > 0.0,
         "cone-not-seen": not seen[6],

@@ -215,6 +215,11 @@ class Fused:
     scale_std: float
     """Standard deviation of the depth scale that nothing could tell; contained in `covariance`."""
 
+    @property
+    def disagreeing(self) -> float:
+        """Share of the frames, 0 to 1, that count less than half."""
+        return float((self.weights < 0.5).mean())
+
 
 def fuse(stack: Stack, earlier: Sums | None = None) -> Fused:
     """Robust fusion: the answer of the majority, then every frame weighed by how well it agrees."""
