@@ -20,7 +20,7 @@ from siloscope.paper.discharges import real
 from siloscope.paper.scenarios import random_scene, scenario
 from siloscope.scene import ASTRA_S, Feed, Scene, discharge
 from siloscope.straight import straightened
-from siloscope.surface import fit_depth
+from siloscope.surface import PARAMETERS, fit_depth
 
 SILO3 = replace(scenario("silo3"), sensor=ASTRA_S)
 
@@ -175,18 +175,6 @@ def test_the_view_from_elsewhere_takes_any_layout_and_refuses_arrays_that_do_not
             _core.surface_seen_from(*wrong)
 
 
-def test_evidence_from_before_frames_kept_their_rays_is_still_used(tmp_path: Path) -> None:
-    found = calibrate(sequence(sensor=None))
-    document = json.loads(json.dumps(found.to_dict()))
-    for frame in document["evidence"]["frames"]:
-        del frame["base"], frame["rays"]
-    path = tmp_path / "older.json"
-    path.write_text(json.dumps(document))
-    older = calibrate(sequence(2, 0.2, 0.1, sensor=None), continue_from=path)
-    assert older.counts["used"] >= 8
-    assert (np.abs(errors(older)) < 3.0 * stds(older)).all()
-
-
 @pytest.mark.parametrize("diameter", [None, 3.0])
 @pytest.mark.parametrize(("turn", "shift"), [(0.002, 0.0), (0.0, 0.1)])
 def test_a_move_before_an_unknown_sensor_is_found_where_it_was(
@@ -268,6 +256,22 @@ def test_the_frame_from_which_on_the_camera_has_moved_is_found() -> None:
     assert found.counts["before-move"] == len(sequence())
     assert "camera-moved" in found.quality
     assert (np.abs(errors(found, after)) < 4.0 * stds(found)).all()
+
+
+@pytest.mark.parametrize("wrong", ["r_x", "radius", "cone_intercept"])
+@pytest.mark.parametrize("bad", [-2, -1, 0, 1])
+def test_a_bad_frame_beside_a_move_is_on_the_side_of_its_own_pose(bad: int, wrong: str) -> None:
+    silo2 = replace(scenario("silo2"), sensor=ASTRA_S)
+    before = [located(scene) for scene in discharge(silo2, 8, 0.33, 0.22)]
+    elsewhere = replace(silo2, pose=SiloPose(0.01, -0.16718, 1.36, 0.0))
+    after = [located(scene) for scene in discharge(elsewhere, 8, 0.3, 0.06)]
+    side = before if bad < 0 else after
+    frame = side[bad]
+    assert frame.evidence is not None
+    off = np.where(np.arange(12) == PARAMETERS.index(wrong), 2e-3, 0.0)
+    side[bad] = replace(frame, evidence=replace(frame.evidence, parameters=frame.evidence.parameters + off))
+    found = calibrate([*before, *after])
+    assert [move.index for move in found.moves] == [len(before)]
 
 
 def test_a_move_shows_when_the_calibration_is_continued() -> None:
@@ -371,6 +375,42 @@ def test_a_wrong_cone_is_left_out_where_most_frames_show_none() -> None:
     assert abs(found.silo.apex - silo1.silo.geometry.apex) < 3.0 * found.silo_std.apex
 
 
+RIMS = [
+    ("silo1", "flat", 0.1547, (0.07148, -0.06425), 12),
+    ("silo1", "gaussian", 0.236, (-0.02979, -0.07515), 27),
+    ("silo2", "gaussian", 0.2917, (-0.01108, -0.23213), 16),
+    ("silo2", "funnel", 0.2208, (0.06564, -0.11609), 91),
+    ("silo2", "gaussian", 0.3002, (-0.03702, -0.10792), 145),
+]
+"""Frames that show no more of the cone than its rim."""
+
+
+@pytest.mark.parametrize(("name", "feed", "level", "tilt", "seed"), RIMS)
+def test_of_a_cones_rim_slope_and_intercept_are_off_together_as_stated(
+    name: str, feed: str, level: float, tilt: tuple[float, float], seed: int
+) -> None:
+    plain = scenario(name)
+    pose = SiloPose(*tilt, plain.pose.t_x, plain.pose.t_y)
+    found = calibrate([located(replace(plain, pose=pose, feed=Feed(feed, level), sensor=ASTRA_S, seed=seed))])
+    assert found.parameters is not None
+    assert found.parameter_covariance is not None
+    assert found.silo_std.apex is not None
+    assert found.silo_std.apex > 0.04
+    slope = plain.silo.radius / plain.silo.cone_height
+    off = found.parameters[5:7] - slope * np.array([1.0, plain.silo.cylinder_height + plain.silo.cone_height])
+    squared = off @ np.linalg.solve(found.parameter_covariance[5:7, 5:7], off)
+    assert squared < 14.0  # 60 to 1300 where steps are taken in slope and apex
+
+
+def test_a_cones_rim_agrees_with_the_whole_cone() -> None:
+    seen = replace(scenario("silo2"), pose=SiloPose(0.01, -0.16718, 1.36, 0.0), sensor=ASTRA_S)
+    found = calibrate([located(scene) for scene in discharge(seen, 10, 0.3, 0.0)][:6])
+    rim = found.frames[0]
+    assert rim.deviation is not None
+    assert rim.deviation < 3.0  # 5.9 where frames are added up in slope and apex
+    assert rim.weight == 1.0
+
+
 def test_frames_of_other_silos_disagree_and_vague_ones_leave_the_axis_open() -> None:
     others = [located(random_scene(seed, Feed("gaussian", 0.2), sensor=ASTRA_S)) for seed in (40, 41, 42)]
     assert calibrate(others).reason == "frames-disagree"
@@ -467,6 +507,8 @@ DAMAGES = {
     "negative variance": (["covariance", 0, 0], -1.0, "negative"),
     "unsymmetric": (["covariance", 0, 1], 1.0, "symmetric"),
     "names": (["parameters", "names"], ["r_x"], "parameters.names"),
+    "parameters": (["parameters"], 3, "'parameters' must be"),
+    "evidence of other parameters": (["evidence", "names"], None, "evidence.names"),
     "excess": (["excess"], 0.5, "at least 1"),
     "code": (["quality"], ["splendid"], "splendid"),
     "record": (["frames", 2], 7, "frames[2]"),

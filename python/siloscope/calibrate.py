@@ -408,8 +408,9 @@ def _by_information(history: _History, stack: Stack, fused: Fused, config: dict[
 
 def _answer(history: _History, stack: Stack, fused: Fused, config: dict[str, Any]) -> Calibration:
     values = fused.parameters
-    radius, slope, apex = (None if not np.isfinite(v) else float(v) for v in values[4:7])
-    silo, silo_std = geometry(radius, None if slope is None or apex is None else (slope, apex), fused.covariance)
+    radius, slope, intercept = (None if not np.isfinite(v) else float(v) for v in values[4:7])
+    cone = None if slope is None or intercept is None else (slope, intercept)
+    silo, silo_std = geometry(radius, cone, fused.covariance)
     return Calibration(
         "ok",
         pose=SiloPose(*(float(v) for v in values[:4])),
@@ -485,7 +486,7 @@ def _kept(history: _History, stack: Stack, fused: Fused) -> Evidence:
 def _determined(fused: Fused) -> bool:
     """Whether the frames, apart from an unknown scale, fix the pose."""
     values, variance = fused.parameters, np.diag(fused.covariance)
-    size = values[4] if np.isfinite(values[4]) else values[5] * values[6]
+    size = values[4] if np.isfinite(values[4]) else values[6]
     scale = (np.nan_to_num(values[2:4]) * fused.scale_std) ** 2
     direction = math.sqrt(variance[0] + variance[1])
     position = math.sqrt(max(float((variance[2:4] - scale).sum()), 0.0))
@@ -528,6 +529,7 @@ def _mean_geometry(evidence: list[SurfaceEvidence]) -> SiloGeometry:
     if not evidence:
         return SiloGeometry()
     values = np.array([e.parameters[4:7] for e in evidence])
+    values[:, 2] /= values[:, 1]  # the apex, from the cone's intercept and slope
     means = [float(column[np.isfinite(column)].mean()) if np.isfinite(column).any() else None for column in values.T]
     radius, slope, apex = means
     bottom = None if radius is None or slope is None or apex is None else apex - radius / slope

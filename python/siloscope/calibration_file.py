@@ -68,6 +68,7 @@ def read(path: Path) -> Calibration:
 def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
     """Plain data; of symmetric matrices only the upper triangle, row by row."""
     return {
+        "names": list(PARAMETERS),
         "frames": [_frame_to_dict(number, frame) for number, frame in evidence.frames],
         "earlier": None if evidence.earlier is None else _sums_to_dict(evidence.earlier),
     }
@@ -184,14 +185,22 @@ def _parameters(document: dict[str, Any]) -> tuple[NDArray[np.float64] | None, N
     table = document.get("parameters")
     if table is None:
         return None, None
-    if not isinstance(table, dict) or table.get("names") != list(PARAMETERS):
-        raise _Wrong(f"'parameters.names' must be {', '.join(PARAMETERS)}")
+    if not isinstance(table, dict):
+        raise _Wrong("'parameters' must be an object or null")
+    _check_names(table, "parameters")
     values = _vector(table, "values", "parameters.values", nullable=True)
     return values, _covariance(_entry(table, "covariance", list), "parameters.covariance", SIZE)
 
 
+def _check_names(table: dict[str, Any], where: str) -> None:
+    if table.get("names") != list(PARAMETERS):
+        raise _Wrong(f"'{where}.names' must be {', '.join(PARAMETERS)}, as this version of siloscope has them")
+
+
 def _evidence(table: dict[str, Any]) -> Evidence:
     earlier = table.get("earlier")
+    if earlier or table.get("frames"):
+        _check_names(table, "evidence")
     if earlier is not None and not isinstance(earlier, dict):
         raise _Wrong("'evidence.earlier' must be an object or null")
     return Evidence(
@@ -204,8 +213,6 @@ def _frame_evidence(table: dict[str, Any], where: str) -> tuple[int, SurfaceEvid
     free = _entry(table, "free", list, f"{where}.free")
     if len(free) != SIZE or not all(isinstance(f, bool) for f in free):
         raise _Wrong(f"'{where}.free' must be {SIZE} times true or false")
-    if "base" not in table and "rays" not in table:  # written before frames kept them
-        table = {**table, "base": table.get("parameters"), "rays": []}
     vectors = {name: _vector(table, name, f"{where}.{name}", nullable=name != "gradient") for name in _VECTORS}
     matrices = {name: _symmetric(table, name, f"{where}.{name}") for name in _MATRICES}
     scale_std = _number(table, "scale_std", least=0.0, where=where)

@@ -20,7 +20,7 @@ SIZE = len(PARAMETERS)
 RADIUS, SCALE, QUADRATIC = (PARAMETERS.index(name) for name in ("radius", "scale", "quadratic"))
 BIAS = PARAMETERS.index("offset")
 """From here on a parameter is estimated only where a prior holds it."""
-LENGTHS = tuple(PARAMETERS.index(name) for name in ("t_x", "t_y", "radius", "apex"))
+LENGTHS = tuple(PARAMETERS.index(name) for name in ("t_x", "t_y", "radius", "cone_intercept"))
 """Parameters that grow with the depth scale."""
 
 AGREE = 2.58

@@ -17,10 +17,10 @@ from siloscope.pose import SiloPose
 from siloscope.sensors import SensorProfile
 
 PARAMETERS = (
-    *("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "apex"),
+    *("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "cone_intercept"),
     *("offset", "scale", "quadratic", "oval_cos", "oval_sin"),
 )
-"""Order of the parameters: pose; radius; cone (radius per metre of height, z of its vertex); depth bias; ovality."""
+"""Order of the parameters: pose; radius; cone (its radius b − m·z: slope m, intercept b); depth bias; ovality."""
 
 OVALITY = PARAMETERS.index("oval_cos")
 
@@ -237,17 +237,23 @@ def _estimate(
 def geometry(
     radius: float | None, cone: tuple[float, float] | None, covariance: NDArray[np.float64]
 ) -> tuple[SiloGeometry, SiloGeometry]:
-    """Geometry and its standard deviations from radius R, cone slope m and apex z_a; bottom = z_a − R/m."""
+    """Geometry and its standard deviations from radius R, cone slope m and intercept b; the cone has radius b − m·z."""
     std = np.sqrt(np.diag(covariance))
     r_std = None if radius is None else float(std[4])
     if cone is None:
         return SiloGeometry(radius=radius), SiloGeometry(radius=r_std)
-    slope, apex = cone
+    slope, intercept = cone
+
+    def height(radius: float, by_radius: float) -> tuple[float, float]:
+        z = (intercept - radius) / slope
+        jacobian = np.array([by_radius, -z, 1.0]) / slope
+        return z, float(np.sqrt(jacobian @ covariance[4:7, 4:7] @ jacobian))
+
+    apex, apex_std = height(0.0, 0.0)
     if radius is None:
-        return SiloGeometry(apex=apex), SiloGeometry(apex=float(std[6]))
-    jacobian = np.array([-1.0 / slope, radius / slope**2, 1.0])
-    bottom_std = float(np.sqrt(jacobian @ covariance[4:7, 4:7] @ jacobian))
-    return SiloGeometry(radius, apex - radius / slope, apex), SiloGeometry(r_std, bottom_std, float(std[6]))
+        return SiloGeometry(apex=apex), SiloGeometry(apex=apex_std)
+    bottom, bottom_std = height(radius, -1.0)
+    return SiloGeometry(radius, bottom, apex), SiloGeometry(r_std, bottom_std, apex_std)
 
 
 def _ratios(counts: Any) -> Ratios | None:
@@ -295,7 +301,7 @@ def _gravity_check(pose: SiloPose, gravity: NDArray[np.float64]) -> dict[str, fl
 def _evidence(
     found: dict[str, Any], profile: SensorProfile, diameter: float | None, gravity: NDArray[np.float64] | None
 ) -> SurfaceEvidence:
-    slope, apex = found["cone"] or (np.nan, np.nan)
+    slope, intercept = found["cone"] or (np.nan, np.nan)
     radius = np.nan if found["radius"] is None else found["radius"]
     prior = found["prior"]
     free = np.array(found["free"]) | (np.arange(len(PARAMETERS)) >= OVALITY) & (prior > 0.0)
@@ -308,7 +314,8 @@ def _evidence(
         tilt = SiloPose.from_axis(gravity, np.zeros(3))
         expected[:2] = tilt.r_x, tilt.r_y
     return SurfaceEvidence(
-        parameters=np.array([*found["pose"], radius, slope, apex, *found["bias"], *found["ovality"]]) + found["step"],
+        parameters=np.array([*found["pose"], radius, slope, intercept, *found["bias"], *found["ovality"]])
+        + found["step"],
         information=found["information"],
         gradient=found["gradient"],
         scatter=found["scatter"],

@@ -160,7 +160,7 @@ fn result<'py>(py: Python<'py>, found: &SurfaceFit) -> PyResult<Bound<'py, PyDic
     let pose = found.fit.surface.pose;
     out.set_item("pose", (pose.r_x, pose.r_y, pose.t_x, pose.t_y))?;
     out.set_item("radius", found.fit.surface.radius)?;
-    out.set_item("cone", found.fit.surface.cone.map(|c| (c.slope, c.apex)))?;
+    out.set_item("cone", found.fit.surface.cone.map(|c| (c.slope, c.intercept())))?;
     out.set_item("ovality", found.fit.surface.ovality)?;
     let bias = found.fit.bias;
     out.set_item("bias", (bias.offset, bias.scale, bias.quadratic))?;

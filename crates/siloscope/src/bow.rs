@@ -27,7 +27,7 @@ struct Tile {
     weight: f64,
 }
 
-/// What a cone's bow adds to the covariance of its slope and apex.
+/// What a cone's bow adds to the covariance of its slope and intercept.
 pub fn bow_uncertainty(fit: &Fit, tiles: &[TileEquation]) -> Information {
     let Some(cone) = fit.surface.cone else { return Information::zeros() };
     let on_cone = tiles.iter().map(|t| &t.equation).filter(|e| e.part == Part::Cone);
@@ -52,9 +52,9 @@ fn left_open(cone: &Cone, seen: &[Tile]) -> Information {
     let across = share * cone.slope.hypot(1.0);
     let steps = [[start, rise], [start - more * at, rise + more]].map(|[start, rise]| {
         let slope = (cone.slope - across * rise / length).max(FLATTEST * cone.slope);
-        let apex = middle + (cone.slope * (cone.apex - middle) + across * start) / slope;
         let mut step = Parameters::zeros();
-        (step[5], step[6]) = (slope - cone.slope, apex - cone.apex);
+        step[5] = slope - cone.slope;
+        step[6] = step[5] * middle + across * start;
         step
     });
     steps.iter().map(|step| step * step.transpose()).sum()
@@ -184,7 +184,7 @@ mod tests {
             let (cone, seen) = cone_through(feed, NOISE);
             let spread = left_open(&cone, &seen).fixed_view::<2, 2>(5, 5).into_owned();
             for part in [upper, lower] {
-                let off = Vector2::new(part.slope - cone.slope, part.apex - cone.apex);
+                let off = Vector2::new(part.slope - cone.slope, part.intercept() - cone.intercept());
                 let inverse = spread.try_inverse().unwrap_or_default();
                 prop_assert!(off.dot(&(inverse * off)) < 4.0, "{off:?} {spread:?}");
             }

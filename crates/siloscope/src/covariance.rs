@@ -173,9 +173,9 @@ const RESOLUTION: f64 = 3e-4;
 /// The share of an unknown depth scale in the covariance: every length of the answer goes with it.
 pub fn scale_uncertainty(fit: &Fit, std: f64) -> Information {
     let pose = &fit.surface.pose;
-    let apex = fit.surface.cone.map_or(0.0, |c| c.apex);
+    let intercept = fit.surface.cone.map_or(0.0, |c| c.intercept());
     let mut lengths = Parameters::zeros();
-    for (k, length) in [(2, pose.t_x), (3, pose.t_y), (4, fit.surface.radius.unwrap_or(0.0)), (6, apex)] {
+    for (k, length) in [(2, pose.t_x), (3, pose.t_y), (4, fit.surface.radius.unwrap_or(0.0)), (6, intercept)] {
         lengths[k] = length * std;
     }
     lengths * lengths.transpose()

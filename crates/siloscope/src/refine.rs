@@ -8,7 +8,7 @@
 use crate::Vec3;
 use crate::patches::Patches;
 use crate::sensor::{DepthBias, NoiseLaw};
-use crate::surface::{Information, Local, OVALITY, PARAMETERS, Parameters, Part, PlacedSurface, SiloSurface};
+use crate::surface::{Cone, Information, Local, OVALITY, PARAMETERS, Parameters, Part, PlacedSurface, SiloSurface};
 
 /// What is known before the frame is looked at.
 #[derive(Debug, Clone)]
@@ -288,14 +288,19 @@ impl Fit {
     pub fn apply(&mut self, step: &Parameters) {
         let shrink = |value: f64, share: f64, of: f64| value.clamp(-share * of, share * of);
         let mut step = *step;
-        let reach = self.surface.radius.or(self.surface.cone.map(|c| c.apex * c.slope)).unwrap_or(1.0).abs();
+        let reach = self.surface.radius.or(self.surface.cone.map(|c| c.intercept())).unwrap_or(1.0).abs();
         for k in 0..2 {
             step[k] = shrink(step[k], 0.2, 1.0);
         }
-        for k in [2, 3, 4, 6] {
+        for k in 2..=4 {
             step[k] = shrink(step[k], 0.3, reach);
         }
-        step[5] = shrink(step[5], 0.3, self.surface.cone.map_or(1.0, |c| c.slope));
+        if let Some(cone) = self.surface.cone {
+            let share = (0.3 * cone.slope / step[5].abs()).min(1.0);
+            let to = Cone::with_intercept(cone.slope + share * step[5], cone.intercept() + share * step[6]);
+            let apex = cone.apex + shrink(to.apex - cone.apex, 0.3, reach);
+            (step[5], step[6]) = (to.slope - cone.slope, to.slope * apex - cone.intercept());
+        }
         self.surface = self.surface.stepped(&step);
         self.bias.offset += step[7];
         self.bias.scale += step[8];
@@ -313,7 +318,7 @@ impl Fit {
             ovality: self.surface.ovality,
             pose: crate::SiloPose { t_x: pose.t_x * factor, t_y: pose.t_y * factor, ..pose },
             radius: Some(radius),
-            cone: cone.map(|c| crate::surface::Cone { apex: c.apex * factor, ..c }),
+            cone: cone.map(|c| Cone { apex: c.apex * factor, ..c }),
         };
         self.bias.scale = (1.0 + self.bias.scale) / factor - 1.0;
         self.bias.quadratic /= factor * factor;

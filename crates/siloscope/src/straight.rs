@@ -47,10 +47,10 @@ fn spread(tiles: &[&TileEquation], n: usize, ray_of: &impl Fn(usize) -> Vec3) ->
 /// The parameters of a wall and a depth bias; NaN for a part that is not there.
 pub fn parameters_of(surface: &SiloSurface, bias: &DepthBias) -> Parameters {
     let SiloPose { r_x, r_y, t_x, t_y } = surface.pose;
-    let (slope, apex) = surface.cone.map_or((f64::NAN, f64::NAN), |c| (c.slope, c.apex));
+    let (slope, intercept) = surface.cone.map_or((f64::NAN, f64::NAN), |c| (c.slope, c.intercept()));
     let radius = surface.radius.unwrap_or(f64::NAN);
     let ([cos, sin], DepthBias { offset, scale, quadratic }) = (surface.ovality, *bias);
-    Parameters::from([r_x, r_y, t_x, t_y, radius, slope, apex, offset, scale, quadratic, cos, sin])
+    Parameters::from([r_x, r_y, t_x, t_y, radius, slope, intercept, offset, scale, quadratic, cos, sin])
 }
 
 /// A wall and a depth bias, ready to predict readings.
@@ -63,7 +63,7 @@ impl Place {
     fn new(p: &Parameters) -> Self {
         let pose = SiloPose { r_x: p[0], r_y: p[1], t_x: p[2], t_y: p[3] };
         let radius = Some(p[4]).filter(|r| r.is_finite());
-        let cone = Some(Cone { slope: p[5], apex: p[6] }).filter(|c| c.slope.is_finite() && c.apex.is_finite());
+        let cone = Some(Cone::with_intercept(p[5], p[6])).filter(|c| c.slope.is_finite() && c.apex.is_finite());
         let wall = PlacedSurface::new(SiloSurface { pose, radius, cone, ovality: [p[10], p[11]] });
         Self { wall, bias: DepthBias { offset: p[7], scale: p[8], quadratic: p[9] } }
     }
@@ -187,7 +187,7 @@ mod tests {
     const FREE: [bool; PARAMETERS] = [true; PARAMETERS];
 
     fn base() -> Parameters {
-        Parameters::from([0.2, -0.24, 0.6, 0.5, 1.5, 0.577, 4.5, 0.003, -0.01, 0.02, 0.002, -0.001])
+        Parameters::from([0.2, -0.24, 0.6, 0.5, 1.5, 0.577, 2.6, 0.003, -0.01, 0.02, 0.002, -0.001])
     }
 
     /// Rays over the image of a camera that sees cylinder and cone.
@@ -242,7 +242,7 @@ mod tests {
         let frame = frame(free);
         for scale in [0.25, 1.0] {
             let mut place = base();
-            (place[4], place[6], place[9]) = (1.5 + 0.03 * scale, 4.5 + 0.05 * scale, 0.02 + 0.01 * scale);
+            (place[4], place[6], place[9]) = (1.5 + 0.03 * scale, 2.6 + 0.03 * scale, 0.02 + 0.01 * scale);
             let (step, _) = frame.seen_from(&place);
             let (wanted, near) = (predicted(&frame, &place), linear(&frame, &(place - base())));
             let (bent, off) = (furthest(&near, &wanted), furthest(&linear(&frame, &step), &wanted));

@@ -14,8 +14,12 @@ pub const PARAMETERS: usize = 12;
 /// Index of the first of the ovality's two parameters.
 pub const OVALITY: usize = 10;
 
-/// Order of the parameters: r_x, r_y, t_x, t_y, radius, cone slope, apex, the depth bias (offset, scale, quadratic), and
-/// the ovality (cosine and sine part).
+/// Order of the parameters: r_x, r_y, t_x, t_y, radius, cone slope, cone intercept, the depth bias (offset, scale,
+/// quadratic), and the ovality (cosine and sine part).
+///
+/// The cone's intercept is its radius m·z_a at the camera's height. The cone's radius m·z_a − m·z is linear in it and in
+/// the slope. In slope and apex it is not: where little of the cone is seen, a frame leaves a long valley open between
+/// them, and that would be bent.
 pub type Parameters = SVector<f64, PARAMETERS>;
 
 /// Information or covariance over `Parameters`.
@@ -52,6 +56,18 @@ pub struct Cone {
     pub apex: f64,
 }
 
+impl Cone {
+    /// The cone with a slope m whose radius at the camera's height is m·z_a, metres.
+    pub fn with_intercept(slope: f64, intercept: f64) -> Self {
+        Self { slope, apex: intercept / slope }
+    }
+
+    /// Radius m·z_a of the cone at the camera's height, metres.
+    pub fn intercept(&self) -> f64 {
+        self.slope * self.apex
+    }
+}
+
 /// How far surfaces that are near each other may differ; lengths as shares of the silo's size.
 #[derive(Debug, Clone, Copy)]
 pub struct Reach {
@@ -79,7 +95,7 @@ impl SiloSurface {
 
     /// A length that tells how large the silo is: its radius, or the cone's radius halfway to the camera's height.
     pub fn size(&self) -> f64 {
-        self.radius.or(self.cone.map(|c| 0.5 * c.slope * c.apex.abs())).unwrap_or(1.0)
+        self.radius.or(self.cone.map(|c| 0.5 * c.intercept().abs())).unwrap_or(1.0)
     }
 
     /// The surface without a part.
@@ -116,7 +132,7 @@ impl SiloSurface {
                 t_y: self.pose.t_y + step[3],
             },
             radius: self.radius.map(|r| r + step[4]),
-            cone: self.cone.map(|c| Cone { slope: c.slope + step[5], apex: c.apex + step[6] }),
+            cone: self.cone.map(|c| Cone::with_intercept(c.slope + step[5], c.intercept() + step[6])),
             ovality: [self.ovality[0] + step[10], self.ovality[1] + step[11]],
         }
     }
@@ -251,7 +267,7 @@ impl PlacedSurface {
         (d[2], d[3]) = (g.x, g.y);
         let radius = match (at.part, self.surface.cone) {
             (Part::Cone, Some(cone)) => {
-                (d[5], d[6]) = ((at.p.z - cone.apex) * at.oval, -cone.slope * at.oval);
+                (d[5], d[6]) = (at.p.z * at.oval, -at.oval);
                 cone.slope * (cone.apex - at.p.z)
             }
             _ => {
@@ -352,6 +368,20 @@ mod tests {
     }
 
     proptest! {
+        /// So no step along what a frame leaves open of the cone leaves the valley of its likelihood.
+        #[test]
+        fn a_step_of_the_cone_changes_its_radius_as_the_derivative_says(
+            slope in -0.3..0.3f64, intercept in -2.0..2.0f64, x in 0.1..1.2f64, z in 3.5..4.9f64,
+        ) {
+            let surface = silo(0.1, -0.2, 0.3, 0.4);
+            let (placed, mut step) = (PlacedSurface::new(surface), Parameters::zeros());
+            (step[5], step[6]) = (slope, intercept);
+            let at = placed.local_of(Vec3::new(x, 0.5 * x, z), Part::Cone);
+            let stepped = PlacedSurface::new(surface.stepped(&step)).local_of(at.p, Part::Cone);
+            let told = at.value + placed.derivative(&Vec3::zeros(), &at).dot(&step);
+            prop_assert!((stepped.value - told).abs() < 1e-12, "{} {told}", stepped.value);
+        }
+
         #[test]
         fn rays_end_on_the_wall(
             r_x in -0.4..0.4f64, r_y in -0.4..0.4f64, t_x in -0.8..0.8f64, t_y in -0.8..0.8f64,

@@ -9,7 +9,7 @@ from siloscope.paper.metrics import LABELS, camera_points
 from siloscope.scene import SimulatedFrame
 
 ORDER = ("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "apex")
-"""Parameters of the bound, as in `siloscope.surface.PARAMETERS`."""
+"""Parameters of the bound: those of the fit, with the apex in place of the cone's intercept."""
 
 
 def cramer_rao(frame: SimulatedFrame) -> NDArray[np.float64]:
