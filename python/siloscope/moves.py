@@ -28,8 +28,8 @@ GRID = 16
 """Places tried at a time."""
 
 MOVING = (0, 1, 2, 3, 6, 10, 11)
-"""Parameters that a move changes: the pose, the apex' depth below the camera, and the ovality's azimuth, which is
-counted from the camera."""
+"""Parameters that a move changes: the pose, the cone's intercept, which is counted from the camera's height, and the
+ovality's azimuth, which is counted from the camera."""
 
 STAYING = (4, 5, 7, 8, 9)
 """Parameters that it does not: radius, cone slope, depth bias."""
@@ -55,10 +55,11 @@ def find_moves(stack: Stack, earlier: Sums | None = None, first: int = 0) -> lis
         return []
     split = _best_split(stack, earlier)
     move = None if split is None else _judged(stack, earlier, split, first)
-    if split is None or move is None:
+    if move is None:
         return []
-    before, after = stack.take(slice(0, split)), stack.take(slice(split, None))
-    return [*find_moves(before, earlier, first), move, *find_moves(after, None, first + split)]
+    place = move.index - first
+    before, after = stack.take(slice(0, place)), stack.take(slice(place, None))
+    return [*find_moves(before, earlier, first), move, *find_moves(after, None, move.index)]
 
 
 def may_have_moved(fused: Fused) -> bool:
@@ -107,7 +108,23 @@ def _judged(stack: Stack, earlier: Sums | None, split: int, first: int) -> Move 
     step, distance = _contrast(totals, max(side.excess for side in sides if side is not None))
     turn, shift = float(np.hypot(*step[:2])), float(np.hypot(*step[2:4]))
     worth = turn > SMALLEST_TURN or shift > SMALLEST_SHIFT
-    return Move(first + split, turn, shift, distance) if worth and distance > SIGNIFICANT else None
+    index = first + _placed(stack, split, sides)
+    return Move(index, turn, shift, distance) if worth and distance > SIGNIFICANT else None
+
+
+def _placed(stack: Stack, split: int, sides: list[Fused | None]) -> int:
+    """The place, with bad frames beside it on the side whose pose is nearer: they cost the same on both."""
+    before, after = sides
+    if before is None or after is None:
+        return split
+    bad = np.concatenate([before.weights, after.weights]) < 0.5
+    poses = np.where(np.arange(SIZE) < RADIUS, [before.parameters, after.parameters], np.nan)
+    to_before, to_after = stack.distances(poses)
+    while split > 0 and bad[split - 1] and to_after[split - 1] < to_before[split - 1]:
+        split -= 1
+    while split < stack.count and bad[split] and to_before[split] < to_after[split]:
+        split += 1
+    return split
 
 
 def _agreeing(side: Fused | None, earlier: Sums | None) -> int:
@@ -124,7 +141,7 @@ def _side(part: Stack, fused: Fused | None, base: Sums | None) -> Sums:
 def _contrast(sides: list[Sums], excess: float) -> tuple[NDArray[np.float64], float]:
     """Step of the pose between two sides (4,), and its squared distance from none.
 
-    Both sides share radius, cone slope, depth bias and the priors on them: only the pose, and the apex seen from it,
+    Both sides share radius, cone slope, depth bias and the priors on them: only the pose, and the cone seen from it,
     may differ. So what all frames have in common does not blur the comparison.
     """
     origin = sides[0].origin
