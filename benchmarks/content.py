@@ -170,11 +170,12 @@ def moved(
     """The calibration with a wrong scale, radius, vertex, turn (rad) or shift (m)."""
     assert silo.parameters is not None
     values = silo.parameters.copy()
-    values[[2, 3, 4, 6]] *= 1.0 + scale
-    values[[0, 2, 4, 6]] += (pose.get("turn", 0.0), pose.get("shift", 0.0), radius, apex)
-    bottom = (1.0 + scale) * (silo.silo.cylinder_bottom or 0.0)
-    values[5] = values[4] / (values[6] - bottom)
-    geometry = siloscope.SiloGeometry(values[4], bottom, values[6])
+    values[2:5] *= 1.0 + scale
+    values[[0, 2, 4]] += (pose.get("turn", 0.0), pose.get("shift", 0.0), radius)
+    bottom, vertex = (1.0 + scale) * (silo.silo.cylinder_bottom or 0.0), (1.0 + scale) * (silo.silo.apex or 0.0) + apex
+    values[5] = values[4] / (vertex - bottom)
+    values[6] = values[5] * vertex
+    geometry = siloscope.SiloGeometry(values[4], bottom, vertex)
     return replace(silo, parameters=values, silo=geometry, pose=siloscope.SiloPose(*values[:4]))
 
 

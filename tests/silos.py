@@ -31,12 +31,14 @@ def scene(
 
 
 def known(scene: Scene, std: float = 0.0) -> siloscope.Calibration:
-    """A calibration with the scene's true pose and geometry, and a standard deviation for all of them."""
+    """A calibration with the scene's true pose, slope and lengths, and a standard deviation for all of them."""
     g, pose = scene.silo.geometry, scene.pose
     slope = g.radius / (g.apex - g.cylinder_bottom)
-    values = [pose.r_x, pose.r_y, pose.t_x, pose.t_y, g.radius, slope, g.apex, *scene.sensor.bias, 0.0, 0.0]
+    values = [pose.r_x, pose.r_y, pose.t_x, pose.t_y, g.radius, slope, slope * g.apex, *scene.sensor.bias, 0.0, 0.0]
     name = "orbbec-astra-s" if scene.sensor.bias == ASTRA_S.bias else None
-    covariance = np.diag([std**2] * 7 + [0.0] * 5)
+    by_vertex = np.eye(12)
+    by_vertex[6, 5:7] = g.apex, slope
+    covariance = by_vertex @ np.diag([std**2] * 7 + [0.0] * 5) @ by_vertex.T
     return siloscope.Calibration(
         "ok",
         pose=pose,

@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 import silos
 import siloscope
 from silos import known, measured, noisy, percent, scene
-from siloscope.content import QUALITY
+from siloscope.content import QUALITY, Datasheet
+from siloscope.content.knowledge import know
 from siloscope.errors import InputError, UsageError
 from siloscope.paper.scenarios import random_scene
 from siloscope.scene import ASTRA_S, PERFECT, Defects, Feed, Silo, defects
@@ -87,6 +88,28 @@ class TestLaws:
         change = abs((moved[0] or 0.0) - (moved[1] or 0.0)) / 2.0
         assert part == pytest.approx(change, rel=0.05, abs=2e-6 * made.silo.capacity)
 
+    @pytest.mark.parametrize("parameter", [5, 6])
+    def test_of_a_cone_alone_too(self, parameter: int) -> None:
+        made = scene(Feed("mound", 0.2))
+        frame = made.render().frame()
+        calibration = _without_cylinder(known(made))
+        step = 2e-4
+        covariance = np.zeros((12, 12))
+        covariance[parameter, parameter] = step**2
+        stated = siloscope.measure(frame, replace(calibration, parameter_covariance=covariance)).parts
+        assert stated is not None
+        ends = [_without_cylinder(_moved(known(made), parameter, sign * step)) for sign in (1, -1)]
+        moved = [siloscope.measure(frame, end).volume or 0.0 for end in ends]
+        assert stated.geometry == pytest.approx(abs(moved[0] - moved[1]) / 2.0, rel=0.05)
+
+    def test_a_calibrations_lengths_are_as_sure_as_it_says(self) -> None:
+        frames = [noisy(scene(Feed("gaussian", level)), seed).render() for seed, level in enumerate((0.35, 0.3, 0.25))]
+        calibration = siloscope.calibrate([frame.frame() for frame in frames], sensor="orbbec-astra-s")
+        std = calibration.silo_std
+        found = np.sqrt(np.diag(know(calibration, None, Datasheet(), None, None).covariance))
+        assert found[4:7] == pytest.approx([std.radius, std.cylinder_bottom, std.apex])
+        assert found[:4] == pytest.approx(np.sqrt(np.diag(calibration.covariance)))
+
     def test_the_same_frame_gives_the_same_answer(self) -> None:
         frame = noisy(scene(Feed("funnel", 0.5))).render()
         calibration = known(frame.scene)
@@ -118,13 +141,20 @@ class TestLaws:
         assert raw == pytest.approx(answers[0], abs=1e-4 * made.silo.capacity)
 
 
+def _without_cylinder(calibration: siloscope.Calibration) -> siloscope.Calibration:
+    assert calibration.parameters is not None
+    values = calibration.parameters.copy()
+    values[4] = np.nan
+    return replace(calibration, parameters=values, silo=siloscope.SiloGeometry(apex=calibration.silo.apex))
+
+
 def _moved(calibration: siloscope.Calibration, parameter: int, step: float) -> siloscope.Calibration:
     assert calibration.parameters is not None
     values = calibration.parameters.copy()
     values[parameter] += step
-    radius, slope, apex = (float(v) for v in values[4:7])
+    radius, slope, intercept = (float(v) for v in values[4:7])
     pose = siloscope.SiloPose(*(float(v) for v in values[:4]))
-    silo = siloscope.SiloGeometry(radius, apex - radius / slope, apex)
+    silo = siloscope.SiloGeometry(radius, (intercept - radius) / slope, intercept / slope)
     return replace(calibration, parameters=values, pose=pose, silo=silo)
 
 
@@ -196,10 +226,7 @@ class TestTruth:
     def test_content_in_the_cone_needs_no_cylinder(self) -> None:
         made = scene(Feed("mound", 0.2))
         calibration = known(made)
-        assert calibration.parameters is not None
-        values = calibration.parameters.copy()
-        values[4] = np.nan
-        blind = replace(calibration, parameters=values, silo=siloscope.SiloGeometry(apex=calibration.silo.apex))
+        blind = _without_cylinder(calibration)
         frame = made.render()
         content = siloscope.measure(frame.frame(), blind)
         assert content.volume == pytest.approx(frame.true_volume, abs=1e-3 * made.silo.capacity)
@@ -218,10 +245,7 @@ class TestTruth:
         narrow = replace(silos.SMALL, fx=2.0 * silos.SMALL.fx, fy=2.0 * silos.SMALL.fy)
         made = replace(scene(Feed("mound", 0.12)), camera=narrow)
         calibration = known(made)
-        assert calibration.parameters is not None
-        values = calibration.parameters.copy()
-        values[4] = np.nan
-        blind = replace(calibration, parameters=values, silo=siloscope.SiloGeometry(apex=calibration.silo.apex))
+        blind = _without_cylinder(calibration)
         frame = made.render()
         with_wall, without = (siloscope.measure(frame.frame(), c) for c in (calibration, blind))
         assert without.volume == pytest.approx(frame.true_volume, abs=3.0 * (without.volume_std or 0.0))

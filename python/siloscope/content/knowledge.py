@@ -132,13 +132,13 @@ def _cone_alone(calibration: Calibration, lengths: Lengths) -> Lengths:
     """Where nobody knows the cylinder, the cone continued up to the camera: content in the cone needs no more."""
     if lengths.geometry.radius is not None or calibration.parameters is None:
         return lengths
-    slope, apex = (float(v) for v in calibration.parameters[5:7])
-    if not (math.isfinite(slope * apex) and slope > 0.0 and apex > 0.0):
+    slope, intercept = (float(v) for v in calibration.parameters[5:7])
+    if not (math.isfinite(slope * intercept) and slope > 0.0 and intercept > 0.0):
         return lengths
     said = ("the content lies in the cone: the cylinder was never seen",)
     return replace(
         lengths,
-        geometry=SiloGeometry(slope * apex, 0.0, apex),
+        geometry=SiloGeometry(intercept, 0.0, intercept / slope),
         assumed=tuple(a for a in lengths.assumed if "filled" not in a) + said,
         cone_only=True,
     )
@@ -179,7 +179,7 @@ def _ovality(calibration: Calibration) -> tuple[float, float]:
 
 
 def _covariance(calibration: Calibration, lengths: Lengths) -> NDArray[np.float64]:
-    """The calibration's covariance and the datasheet's, with the cylinder's bottom in the place of the cone's slope."""
+    """The calibration's covariance and the datasheet's, with z_b and z_a in place of the cone's slope and intercept."""
     if calibration.parameters is None or calibration.parameter_covariance is None:
         made = np.diag([0.0] * 4 + list(lengths.added_variance) + [0.0] * 3)
         if calibration.covariance is not None:
@@ -198,20 +198,23 @@ def _covariance(calibration: Calibration, lengths: Lengths) -> NDArray[np.float6
 
 
 def _jacobian(calibration: Calibration, lengths: Lengths) -> NDArray[np.float64]:
-    """Derivatives of `PARAMETERS` by the calibration's, which have the cone's slope m = dr/dz after the radius.
+    """Derivatives of `PARAMETERS` by the calibration's, which have the cone's slope m and intercept b after the radius.
 
-    Where cone and cylinder meet, z_b = z_a - R / m. Of a cone alone z_b is where we cut it, and R = m (z_a - z_b).
+    The cone has the radius b - m z: it ends at z_a = b / m, and where cone and cylinder meet, z_b = (b - R) / m. Of a
+    cone alone z_b is where we cut it, and R = b - m z_b.
     """
     jacobian = np.eye(10)
     slope, geometry = _slope(calibration), lengths.geometry
-    jacobian[5, 5] = 0.0
+    jacobian[5:7] = 0.0
+    if geometry.apex is not None:
+        jacobian[6, 5:7] = np.array([-geometry.apex, 1.0]) / slope
     if geometry.radius is not None and geometry.cylinder_bottom is not None and geometry.apex is not None:
         if lengths.cone_only:
-            jacobian[4, 4:7] = (0.0, geometry.apex - geometry.cylinder_bottom, slope)
+            jacobian[4, 4:7] = (0.0, -geometry.cylinder_bottom, 1.0)
         elif lengths.bottom_from == "wall":
-            jacobian[5, 4:7] = (-1.0 / slope, geometry.radius / slope**2, 1.0)
+            jacobian[5, 4:7] = np.array([-1.0, -geometry.cylinder_bottom, 1.0]) / slope
         elif lengths.bottom_from == "vertex":
-            jacobian[5, 6] = 1.0
+            jacobian[5] = jacobian[6]
         if lengths.apex_from == "bottom":
             jacobian[6] = jacobian[5]
     return np.nan_to_num(jacobian)
