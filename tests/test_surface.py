@@ -161,6 +161,16 @@ def test_a_little_piece_is_no_wall_where_something_likelier_was_refused(seed: in
     assert fit(random_scene(seed, Feed(feed, level), sensor=ASTRA_S), None).status == "refused"
 
 
+@pytest.mark.parametrize(("seed", "feed", "level"), [(74, "mound", 0.452), (419, "flat", 0.489), (449, "funnel", 0.45)])
+def test_equations_are_made_near_the_answer(seed: int, feed: str, level: float) -> None:
+    """A frame that leaves much open takes a long last step, away from where its equations hold."""
+    found = fit(random_scene(seed, Feed(feed, level), sensor=ASTRA_S), None)
+    assert found.pose is not None
+    assert found.evidence is not None
+    pose = [found.pose.r_x, found.pose.r_y, found.pose.t_x, found.pose.t_y]
+    assert (np.abs(pose - found.evidence.base[:4]) < [0.003, 0.003, 0.01, 0.01]).all()
+
+
 def test_a_narrow_band_of_wall_tells_where_the_axis_runs_and_gravity_its_direction() -> None:
     scene = random_scene(128, Feed("funnel", 0.45), sensor=ASTRA_S)
     alone = fit(scene, "orbbec-astra-s")
