@@ -296,10 +296,10 @@ impl Fit {
             step[k] = shrink(step[k], 0.3, reach);
         }
         if let Some(cone) = self.surface.cone {
-            let share = (0.3 * cone.slope / step[5].abs()).min(1.0);
-            let to = Cone::with_intercept(cone.slope + share * step[5], cone.intercept() + share * step[6]);
-            let apex = cone.apex + shrink(to.apex - cone.apex, 0.3, reach);
-            (step[5], step[6]) = (to.slope - cone.slope, to.slope * apex - cone.intercept());
+            // far from the answer a cone's vertex is surer than its radius at the camera's height
+            let slope = cone.slope + shrink(step[5], 0.3, cone.slope);
+            let apex = cone.apex + shrink((step[6] - cone.apex * step[5]) / cone.slope, 0.3, reach);
+            (step[5], step[6]) = (slope - cone.slope, slope * apex - cone.intercept());
         }
         self.surface = self.surface.stepped(&step);
         self.bias.offset += step[7];
