@@ -280,7 +280,7 @@ def recording(*parts: str) -> Any:
 
 def core_limits() -> dict[str, str]:
     """The limits as the core states them."""
-    text = (ROOT / "crates" / "siloscope" / "src" / "evidence.rs").read_text()
+    text = (ROOT / "crates" / "siloscope" / "src" / "shape_tensor" / "diagnostics.rs").read_text()
     return {
         name: value.replace("..", " to ") for name, value in re.findall(r"^const (\w+): [^=]+ = (.+);$", text, re.M)
     }

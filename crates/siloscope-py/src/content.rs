@@ -16,7 +16,7 @@ use siloscope::content::returns::{Rays, Source};
 use siloscope::content::shape::{Form, Shape};
 use siloscope::content::vessel::Vessel;
 use siloscope::content::volume::Kind;
-use siloscope::sensor::{DepthBias, NoiseLaw};
+use siloscope::geometry::sensor::{DepthBias, NoiseLaw};
 use siloscope::{Camera, SiloPose, Vec3};
 
 /// A silo as Python gives it: radius, cylinder_bottom, apex, top, outlet radius and length, ovality c and s.

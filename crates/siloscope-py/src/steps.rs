@@ -6,14 +6,16 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use siloscope::axis::{self, Wall};
-use siloscope::backproject::{DepthImage, Depths};
-use siloscope::candidates::{self, Candidate, View};
-use siloscope::locate::{self, Outcome};
-use siloscope::neighbours::Neighbours;
-use siloscope::shape_tensor::ShapeTensor;
-use siloscope::workers::Workers;
-use siloscope::{Vec3, backproject, grid, neighbours, normals, shape_tensor};
+use siloscope::Vec3;
+use siloscope::base::workers::Workers;
+use siloscope::geometry::backproject::{DepthImage, Depths};
+use siloscope::geometry::{backproject, normals};
+use siloscope::shape_tensor::axis::{self, Wall};
+use siloscope::shape_tensor::candidates::{self, Candidate, View};
+use siloscope::shape_tensor::tensors::ShapeTensor;
+use siloscope::shape_tensor::{self, Outcome};
+use siloscope::stats::neighbours::Neighbours;
+use siloscope::stats::{neighbours, voxel_grid as grid};
 
 type Doubles<'py> = PyReadonlyArray2<'py, f64>;
 type Vectors<'py> = Bound<'py, PyArray2<f64>>;
@@ -161,7 +163,7 @@ fn shape_tensors<'py>(
     let (points, normals) = (vectors(&points)?, vectors(&normals)?);
     same_length("normals", normals.len(), points.len())?;
     let near = near(&neighbours, points.len())?;
-    let tensors = py.detach(|| shape_tensor::shape_tensors(&points, &near, &normals, &Workers::new(threads)));
+    let tensors = py.detach(|| shape_tensor::tensors::shape_tensors(&points, &near, &normals, &Workers::new(threads)));
     let number = |of: fn(&ShapeTensor) -> f64| tensors.iter().map(of).collect::<Vec<_>>().into_pyarray(py);
     let vector = |of: fn(&ShapeTensor) -> Vec3| to_array(py, &tensors.iter().map(of).collect::<Vec<_>>());
     Ok((number(|t| t.k1), number(|t| t.k2), vector(|t| t.e1)?, vector(|t| t.e2)?))
@@ -236,8 +238,10 @@ fn axis_points<'py>(
 /// The six steps' settings: grid, neighbours, view, share, agreement, partners, threads.
 type Settings<'a> = (f64, usize, &'a str, f64, f64, usize, usize);
 
-fn settings((grid, neighbours, view, share, agreement, partners, threads): Settings) -> PyResult<locate::Settings> {
-    Ok(locate::Settings { grid, neighbours, view: self::view(view)?, share, agreement, partners, threads })
+fn settings(
+    (grid, neighbours, view, share, agreement, partners, threads): Settings,
+) -> PyResult<shape_tensor::Settings> {
+    Ok(shape_tensor::Settings { grid, neighbours, view: self::view(view)?, share, agreement, partners, threads })
 }
 
 /// Runs the six steps on a depth image: a dictionary of plain numbers, or only the reason for a refusal, as `refusal`.
@@ -255,14 +259,14 @@ fn shape_tensor_image<'py>(
     let rays = rays.as_ref().map(rays_of).transpose()?;
     let mask = mask.as_ref().map(entries).transpose()?;
     let image = DepthImage::new(depth.depths()?, &camera, rays, unit, mask).map_err(value_error)?;
-    outcome(py, py.detach(|| locate::locate_in_image(&image, &settings)).map_err(value_error)?)
+    outcome(py, py.detach(|| shape_tensor::locate_in_image(&image, &settings)).map_err(value_error)?)
 }
 
 /// Runs the six steps on points (N, 3), metres, seen from the origin; rows that aren't finite are left out.
 #[pyfunction]
 fn shape_tensor_points<'py>(py: Python<'py>, points: Doubles, settings: Settings) -> PyResult<Bound<'py, PyDict>> {
     let (points, settings) = (vectors(&points)?, self::settings(settings)?);
-    outcome(py, py.detach(|| locate::locate_in_points(&points, &settings)).map_err(value_error)?)
+    outcome(py, py.detach(|| shape_tensor::locate_in_points(&points, &settings)).map_err(value_error)?)
 }
 
 fn outcome(py: Python<'_>, found: Outcome) -> PyResult<Bound<'_, PyDict>> {

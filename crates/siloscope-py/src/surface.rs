@@ -4,16 +4,16 @@ use crate::convert::value_error;
 use numpy::{PyArray1, PyArray2, PyArray3, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use siloscope::fit::{Knowledge, Outcome, SurfaceFit, fit_cloud, fit_image};
-use siloscope::known_wall::KnownWall;
-use siloscope::labels::{coverage, label_pixels};
-use siloscope::patches::DepthImage;
-use siloscope::refusal::Refusal;
-use siloscope::sensor::{DepthBias, DepthError, NoiseLaw};
-use siloscope::share::FrameShare;
-use siloscope::straight::{Ray, seen_from};
-use siloscope::surface::{Cone, Information, PARAMETERS, Parameters, SiloSurface};
-use siloscope::workers::Workers;
+use siloscope::base::refusal::Refusal;
+use siloscope::base::workers::Workers;
+use siloscope::fusion::frame_factor::FrameShare;
+use siloscope::fusion::relinearize::{Ray, seen_from};
+use siloscope::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
+use siloscope::geometry::vessel::{Cone, Information, PARAMETERS, Parameters, SiloSurface};
+use siloscope::surface_fit::segmentation::{coverage, label_pixels};
+use siloscope::surface_fit::tiles::DepthImage;
+use siloscope::surface_fit::warm_start::KnownWall;
+use siloscope::surface_fit::{Knowledge, Outcome, SurfaceFit, fit_cloud, fit_image};
 use siloscope::{SiloPose, Vec3};
 
 /// Bias and noise as plain numbers: offset, scale, quadratic; floor, constant, linear, quadratic, factor, power.
@@ -151,7 +151,7 @@ fn add_share(py: Python<'_>, out: &Bound<'_, PyDict>, share: &FrameShare) -> PyR
     out.set_item("prior", PyArray1::from_slice(py, share.prior.as_slice()))
 }
 
-fn matrix<'py>(py: Python<'py>, m: &siloscope::surface::Information) -> PyResult<Bound<'py, PyArray2<f64>>> {
+fn matrix<'py>(py: Python<'py>, m: &siloscope::geometry::vessel::Information) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_slice(py, m.transpose().as_slice()).reshape([PARAMETERS, PARAMETERS])
 }
 

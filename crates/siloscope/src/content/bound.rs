@@ -2,7 +2,7 @@
 
 use super::cells::Cell;
 use super::returns::Line;
-use crate::sensor::NoiseLaw;
+use crate::geometry::sensor::NoiseLaw;
 
 /// Returns within so many standard deviations of the wall belong to the wall.
 const WALL_SIGMAS: f64 = 4.0;

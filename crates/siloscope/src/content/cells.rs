@@ -4,7 +4,7 @@ use super::bound::{Bound, Side};
 use super::doubt::Lever;
 use super::grid::Grid;
 use super::returns::{Line, Returns};
-use crate::sensor::NoiseLaw;
+use crate::geometry::sensor::NoiseLaw;
 
 /// Returns farther than so many robust standard deviations from their cell's median are clutter.
 const CLUTTER_SIGMAS: f32 = 4.0;

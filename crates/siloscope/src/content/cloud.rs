@@ -7,7 +7,7 @@ use super::fit::{Surface, fit, sketch};
 use super::grid::Grid;
 use super::returns::{Returns, Source};
 use super::volume::Kind;
-use crate::sensor::{DepthBias, NoiseLaw};
+use crate::geometry::sensor::{DepthBias, NoiseLaw};
 use crate::{Error, Result, SiloPose, Vec3};
 use nalgebra::Matrix3;
 

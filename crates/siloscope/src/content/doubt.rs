@@ -2,7 +2,7 @@
 
 use super::vessel::Vessel;
 use crate::SiloPose;
-use crate::sensor::DepthBias;
+use crate::geometry::sensor::DepthBias;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Number of parameters of a calibration.

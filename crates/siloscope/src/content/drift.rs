@@ -9,7 +9,7 @@ use super::bound::Bound;
 use super::cells::Cell;
 use super::doubt::Lever;
 use super::grid::Grid;
-use crate::sensor::NoiseLaw;
+use crate::geometry::sensor::NoiseLaw;
 
 /// Takes the drift out of the cells' means.
 pub fn settle(cells: &mut [Cell], grid: &Grid, bound: &Bound, noise: &NoiseLaw, lever: &Lever) {
@@ -54,7 +54,7 @@ mod tests {
     use crate::SiloPose;
     use crate::content::cells::gather;
     use crate::content::returns::{Rays, Returns, Source};
-    use crate::sensor::DepthBias;
+    use crate::geometry::sensor::DepthBias;
 
     const SIGMA: f64 = 0.05;
 

@@ -15,7 +15,7 @@ use super::vessel::Vessel;
 use super::volume::{Kind, Volume, integrate};
 use super::wall::{Shift, shift};
 use super::{cells::Cell, detail};
-use crate::sensor::{DepthBias, NoiseLaw};
+use crate::geometry::sensor::{DepthBias, NoiseLaw};
 use crate::{Result, SiloPose};
 use nalgebra::DVector;
 use std::f64::consts::TAU;

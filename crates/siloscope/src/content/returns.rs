@@ -2,7 +2,7 @@
 //!
 //! Plain loops over short slices: the compiler makes vector code of them, and half of a frame's time is spent here.
 
-use crate::sensor::DepthBias;
+use crate::geometry::sensor::DepthBias;
 use crate::{Error, Result, SiloPose};
 
 /// What a frame is made of.

@@ -4,7 +4,7 @@ use super::doubt::{Covariance, DEPTH, Lever, POSE};
 use super::fit::Surface;
 use super::returns::Returns;
 use super::vessel::Vessel;
-use crate::sensor::NoiseLaw;
+use crate::geometry::sensor::NoiseLaw;
 use nalgebra::{Matrix4, Vector4};
 
 /// How far the wall seems to have moved, as a change of the camera's pose (r_x, r_y, t_x, t_y).

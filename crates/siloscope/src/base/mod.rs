@@ -1,0 +1,5 @@
+//! What every room needs: errors, refusals, workers.
+
+pub mod error;
+pub mod refusal;
+pub mod workers;

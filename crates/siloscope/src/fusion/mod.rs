@@ -1,0 +1,4 @@
+//! What a frame leaves behind for the fusion of many.
+
+pub mod frame_factor;
+pub mod relinearize;

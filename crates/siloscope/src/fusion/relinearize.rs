@@ -1,0 +1,298 @@
+//! What a frame says about walls further off than its equations reach.
+//!
+//! With the depth bias unknown, a frame hardly tells bias from size and place: its likelihood is a long valley, and the
+//! valley is bent. In the depths that the walls predict on the frame's rays the likelihood is quadratic everywhere, so
+//! there the valley is straight. A few of the rays are enough to tell which step from the base of the equations predicts
+//! the depths of another wall: u(θ) = (JᵀWJ)⁻¹ JᵀW (φ(θ) − φ(base)), with φ the predicted readings, J their derivatives
+//! at the base and W the rays' information. Near the base u(θ) = θ − base.
+
+use crate::SiloPose;
+use crate::Vec3;
+use crate::geometry::sensor::DepthBias;
+use crate::geometry::vessel::{Cone, Information, PARAMETERS, Parameters, Part, PlacedSurface, SiloSurface};
+use crate::surface_fit::polish::TileEquation;
+use crate::surface_fit::solver::tukey;
+use nalgebra::{Cholesky, Const};
+
+/// Rays that a frame keeps.
+pub const RAYS: usize = 32;
+
+/// Least share of the rays for a part that is seen.
+const LEAST: usize = RAYS / 4;
+
+/// A ray (x, y, 1) of the camera frame and its information, 1/m²; none where that is 0.
+pub type Ray = [f64; 3];
+
+/// Some of the wall tiles' rays, of both parts, with the information of all; `ray_of` tells that of a patch.
+pub fn some_rays(tiles: &[TileEquation], ray_of: impl Fn(usize) -> Vec3) -> Vec<Ray> {
+    let of_part = |part: Part| tiles.iter().filter(|t| t.equation.part == part).collect::<Vec<_>>();
+    let (cylinder, cone) = (of_part(Part::Cylinder), of_part(Part::Cone));
+    let share = RAYS * cone.len() / tiles.len().max(1);
+    let most = RAYS - LEAST.min(cylinder.len());
+    let of_cone = share.max(LEAST.min(cone.len())).min(most);
+    [(cylinder, RAYS - of_cone), (cone, of_cone)].iter().flat_map(|(tiles, n)| spread(tiles, *n, &ray_of)).collect()
+}
+
+/// At most n of the tiles, evenly among them, each with the information of those it stands for.
+fn spread(tiles: &[&TileEquation], n: usize, ray_of: &impl Fn(usize) -> Vec3) -> Vec<Ray> {
+    let n = n.min(tiles.len());
+    let stands_for = tiles.len() as f64 / n.max(1) as f64;
+    let ray = |tile: &TileEquation| {
+        let (q, e) = (ray_of(tile.patch), &tile.equation);
+        [q.x, q.y, stands_for * tukey(e.residual * e.residual / e.variance) / e.variance]
+    };
+    (0..n).map(|k| ray(tiles[(2 * k + 1) * tiles.len() / (2 * n)])).collect()
+}
+
+/// The parameters of a wall and a depth bias; NaN for a part that is not there.
+pub fn parameters_of(surface: &SiloSurface, bias: &DepthBias) -> Parameters {
+    let SiloPose { r_x, r_y, t_x, t_y } = surface.pose;
+    let (slope, intercept) = surface.cone.map_or((f64::NAN, f64::NAN), |c| (c.slope, c.intercept()));
+    let radius = surface.radius.unwrap_or(f64::NAN);
+    let ([cos, sin], DepthBias { offset, scale, quadratic }) = (surface.ovality, *bias);
+    Parameters::from([r_x, r_y, t_x, t_y, radius, slope, intercept, offset, scale, quadratic, cos, sin])
+}
+
+/// A wall and a depth bias, ready to predict readings.
+struct Place {
+    wall: PlacedSurface,
+    bias: DepthBias,
+}
+
+impl Place {
+    fn new(p: &Parameters) -> Self {
+        let pose = SiloPose { r_x: p[0], r_y: p[1], t_x: p[2], t_y: p[3] };
+        let radius = Some(p[4]).filter(|r| r.is_finite());
+        let cone = Some(Cone::with_intercept(p[5], p[6])).filter(|c| c.slope.is_finite() && c.apex.is_finite());
+        let wall = PlacedSurface::new(SiloSurface { pose, radius, cone, ovality: [p[10], p[11]] });
+        Self { wall, bias: DepthBias { offset: p[7], scale: p[8], quadratic: p[9] } }
+    }
+
+    /// The part that a ray meets.
+    fn part(&self, ray: &Ray) -> Part {
+        self.wall.depth(&Vec3::new(ray[0], ray[1], 1.0)).1
+    }
+
+    /// The predicted reading on a ray that meets a part, with its derivative; `None` where it misses or grazes it.
+    fn reading(&self, ray: &Ray, part: Part) -> Option<(f64, Parameters)> {
+        let (across, q) = ([ray[0], ray[1]], Vec3::new(ray[0], ray[1], 1.0));
+        let round = match part {
+            Part::Cylinder => self.wall.cylinder_depth(across),
+            Part::Cone => self.wall.cone_depth(across),
+        };
+        let d = self.wall.rounded(across, round, part);
+        let p = q * d;
+        let at = self.wall.local_of(self.wall.to_silo(&p), part);
+        let along = at.gradient.dot(&self.wall.turn(&q));
+        if !(d > 0.0 && along.abs() > GRAZING * at.gradient.norm() * q.norm()) {
+            return None;
+        }
+        let mut row = self.wall.derivative(&p, &at) * (-self.bias.slope(d) / along);
+        (row[7], row[8], row[9]) = (1.0, d, d * d);
+        Some((self.bias.measured(d), row))
+    }
+}
+
+/// Cosine of the incidence below which a ray tells nothing.
+const GRAZING: f64 = 0.02;
+
+/// A frame's rays at the base of its equations.
+struct Straight {
+    base: Parameters,
+    /// Ray, part, reading and its derivative.
+    rays: Vec<(Ray, Part, f64, Parameters)>,
+    scale: Parameters,
+    free: [bool; PARAMETERS],
+    normal: Cholesky<f64, Const<PARAMETERS>>,
+}
+
+/// Of the normal equations' unit diagonal: keeps directions that no ray tells (the depth scale) from being divided by 0.
+const RIDGE: f64 = 1e-13;
+
+impl Straight {
+    /// `free` are the parameters that the frame estimates; `None` where the rays tell nothing.
+    pub fn new(base: &Parameters, rays: &[Ray], free: [bool; PARAMETERS]) -> Option<Self> {
+        let place = Place::new(base);
+        let told = rays.iter().filter(|ray| ray[2] > 0.0).filter_map(|ray| {
+            let part = place.part(ray);
+            let among = |row: Parameters| row.map_with_location(|k, _, v| if free[k] { v } else { 0.0 });
+            place.reading(ray, part).map(|(reading, row)| (*ray, part, reading, among(row)))
+        });
+        let rays: Vec<_> = told.collect();
+        let mut normal = Information::zeros();
+        rays.iter().for_each(|(ray, _, _, row)| normal.ger(ray[2], row, row, 1.0));
+        let scale = Parameters::from_fn(|k, _| if normal[(k, k)] > 0.0 { normal[(k, k)].powf(-0.5) } else { 0.0 });
+        let unit = |r: usize, c: usize, v: f64| {
+            let ridge = if scale[r] > 0.0 { RIDGE } else { 1.0 };
+            v * scale[r] * scale[c] + if r == c { ridge } else { 0.0 }
+        };
+        let normal = Cholesky::new(normal.map_with_location(unit)).filter(|_| !rays.is_empty())?;
+        Some(Self { base: *base, rays, scale, free, normal })
+    }
+
+    /// The step u(θ) from the base that predicts what the wall and bias at θ do, and its derivative there.
+    ///
+    /// The step is one of the free parameters alone: where another one differs, they make up for it. What is free and
+    /// told by no ray is as far from the base as it is, and so is what a ray tells that misses the wall at θ.
+    pub fn seen_from(&self, place: &Parameters) -> (Parameters, Information) {
+        let there = Place::new(place);
+        let gap = finite(place - self.base);
+        let (mut step, mut turn) = (Parameters::zeros(), Information::zeros());
+        for (ray, part, reading, row) in &self.rays {
+            let (change, slope) = match there.reading(ray, *part) {
+                Some((predicted, slope)) => (predicted - reading, slope),
+                None => (row.dot(&gap), *row),
+            };
+            step.axpy(ray[2] * change, row, 1.0);
+            turn.ger(ray[2], row, &slope, 1.0);
+        }
+        step = self.solved(step.component_mul(&self.scale)).component_mul(&self.scale);
+        for mut column in turn.column_iter_mut() {
+            let solved = self.solved(column.component_mul(&self.scale)).component_mul(&self.scale);
+            column.copy_from(&solved);
+        }
+        for k in (0..PARAMETERS).filter(|&k| self.free[k] && self.scale[k] == 0.0) {
+            (step[k], turn[(k, k)]) = (gap[k], 1.0);
+        }
+        (step, turn)
+    }
+
+    fn solved(&self, right: Parameters) -> Parameters {
+        self.normal.solve(&right)
+    }
+}
+
+/// What of a frame's equations, made at `base` with `rays`, predicts the readings at `place`: the step from the base and
+/// its derivative. Without rays that tell anything the equations hold as they are: the step is the distance.
+pub fn seen_from(
+    base: &Parameters,
+    rays: &[Ray],
+    free: [bool; PARAMETERS],
+    place: &Parameters,
+) -> (Parameters, Information) {
+    match Straight::new(base, rays, free) {
+        Some(frame) => frame.seen_from(place),
+        None => (finite(place - base), Information::identity()),
+    }
+}
+
+fn finite(values: Parameters) -> Parameters {
+    values.map(|v| if v.is_finite() { v } else { 0.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const FREE: [bool; PARAMETERS] = [true; PARAMETERS];
+
+    fn base() -> Parameters {
+        Parameters::from([0.2, -0.24, 0.6, 0.5, 1.5, 0.577, 2.6, 0.003, -0.01, 0.02, 0.002, -0.001])
+    }
+
+    /// Rays over the image of a camera that sees cylinder and cone.
+    fn rays() -> Vec<Ray> {
+        let ray = |k: usize| [0.56 * ((k as f64 * 0.618).fract() - 0.5), 0.42 * (k as f64 / 31.0 - 0.5), 1e4];
+        (0..32).map(ray).map(|[x, y, w]| [2.0 * x, 2.0 * y, w]).collect()
+    }
+
+    fn frame(free: [bool; PARAMETERS]) -> Straight {
+        Straight::new(&base(), &rays(), free).expect("the rays meet the wall")
+    }
+
+    #[test]
+    fn both_parts_are_seen() {
+        let parts: Vec<Part> = frame(FREE).rays.iter().map(|r| r.1).collect();
+        assert!(parts.contains(&Part::Cylinder) && parts.contains(&Part::Cone));
+    }
+
+    /// Readings that steps predict to first order from the base.
+    fn linear(frame: &Straight, step: &Parameters) -> Vec<f64> {
+        frame.rays.iter().map(|(_, _, _, row)| row.dot(step)).collect()
+    }
+
+    fn predicted(frame: &Straight, place: &Parameters) -> Vec<f64> {
+        let there = Place::new(place);
+        let change = |(ray, part, reading, _): &(Ray, Part, f64, Parameters)| {
+            there.reading(ray, *part).map_or(f64::NAN, |(predicted, _)| predicted - reading)
+        };
+        frame.rays.iter().map(change).collect()
+    }
+
+    fn furthest(a: &[f64], b: &[f64]) -> f64 {
+        a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_derivatives_are_those_of_the_readings() {
+        let frame = frame(FREE);
+        for k in 0..PARAMETERS {
+            let mut step = Parameters::zeros();
+            step[k] = 1e-6;
+            let numeric: Vec<f64> = predicted(&frame, &(base() + step)).iter().map(|v| v / 1e-6).collect();
+            assert!(furthest(&numeric, &linear(&frame, &(step / 1e-6))) < 1e-3, "{k}");
+        }
+    }
+
+    /// Along a bent valley: the radius 2 % too large, and the bias that makes up for most of it.
+    #[test]
+    fn the_step_predicts_what_a_far_place_does() {
+        let mut free = FREE;
+        free[8] = false;
+        let frame = frame(free);
+        for scale in [0.25, 1.0] {
+            let mut place = base();
+            (place[4], place[6], place[9]) = (1.5 + 0.03 * scale, 2.6 + 0.03 * scale, 0.02 + 0.01 * scale);
+            let (step, _) = frame.seen_from(&place);
+            let (wanted, near) = (predicted(&frame, &place), linear(&frame, &(place - base())));
+            let (bent, off) = (furthest(&near, &wanted), furthest(&linear(&frame, &step), &wanted));
+            assert!(off < 0.2 * bent, "{off} of {bent}");
+        }
+    }
+
+    #[test]
+    fn the_turn_is_the_steps_derivative() {
+        let mut free = FREE;
+        free[8] = false;
+        let frame = frame(free);
+        let mut place = base();
+        (place[0], place[4], place[9]) = (0.205, 1.53, 0.025);
+        let (_, turn) = frame.seen_from(&place);
+        for k in (0..PARAMETERS).filter(|&k| free[k]) {
+            let mut h = Parameters::zeros();
+            h[k] = 1e-5;
+            let numeric = (frame.seen_from(&(place + h)).0 - frame.seen_from(&(place - h)).0) / 2e-5;
+            let (column, readings) = (turn.column(k), linear(&frame, &numeric));
+            assert!(furthest(&readings, &linear(&frame, &column.into_owned())) < 1e-4, "{k}");
+        }
+    }
+
+    /// A larger silo read with a smaller scale gives the same readings; the frame says the same of it.
+    #[test]
+    fn a_silo_and_a_scale_that_read_alike_are_the_same_place() {
+        let (mut place, factor) = (base(), 1.02);
+        [2, 3, 4, 6].into_iter().for_each(|k| place[k] *= factor);
+        place[8] = (1.0 + place[8]) / factor - 1.0;
+        place[9] /= factor * factor;
+        let frame = frame(FREE);
+        let (step, _) = frame.seen_from(&place);
+        assert!(furthest(&linear(&frame, &step), &[0.0; 32]) < 1e-12);
+    }
+
+    #[test]
+    fn rays_that_tell_nothing_make_no_view() {
+        assert!(Straight::new(&base(), &[], FREE).is_none());
+        assert!(Straight::new(&base(), &[[0.1, 0.1, 0.0]], FREE).is_none());
+        assert!(Straight::new(&base(), &[[f64::NAN, 0.1, 1.0]], FREE).is_none());
+        assert!(Straight::new(&Parameters::repeat(f64::NAN), &rays(), FREE).is_none());
+    }
+
+    #[test]
+    fn a_place_that_can_not_be_is_as_far_as_it_is() {
+        let frame = frame(FREE);
+        let mut place = base();
+        place[4] = -3.0;
+        let (step, turn) = frame.seen_from(&place);
+        assert!(step.iter().chain(turn.iter()).all(|v| v.is_finite()));
+    }
+}

@@ -1,0 +1,229 @@
+//! The paper's six steps from a depth frame to the silo's axis (section 2.3). Read this page first.
+
+pub mod axis;
+pub mod candidates;
+pub mod covariance;
+pub mod coverage;
+pub mod diagnostics;
+pub mod profile;
+pub mod tensors;
+
+use crate::base::refusal::Refusal;
+use crate::base::workers::Workers;
+use crate::geometry::backproject::DepthImage;
+use crate::geometry::normals::normals;
+use crate::shape_tensor::axis::{AxisPoint, Consensus, Wall, axis_point, axis_points, consistent_direction};
+use crate::shape_tensor::candidates::{Candidate, View, select_candidates};
+use crate::shape_tensor::covariance::Scatter;
+use crate::shape_tensor::coverage::{Coverage, coverage};
+use crate::shape_tensor::diagnostics::{Evidence, PlacedWall, placed_walls};
+use crate::shape_tensor::profile::{Profile, fit_profile};
+use crate::shape_tensor::tensors::{ShapeTensor, shape_tensors};
+use crate::stats::blocks::blocks;
+use crate::stats::neighbours::{Neighbours, nearest_neighbours};
+use crate::stats::voxel_grid::{Cloud, voxel_grid, voxel_grid_of_image};
+use crate::{Result, SiloPose, Vec3};
+use nalgebra::Matrix4;
+use std::time::Instant;
+
+/// Settings of the six steps.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// Side of the voxels, metres (step 1).
+    pub grid: f64,
+    /// Neighbours k of normals and shape tensors (step 2).
+    pub neighbours: usize,
+    /// From which side the walls are seen (step 3); None to try the inside first and then the others.
+    pub view: Option<View>,
+    /// Share of the clearly curved points kept as candidates (step 3).
+    pub share: f64,
+    /// Robust standard deviations by which a candidate's E1 may be off (step 4); infinite to keep all.
+    pub agreement: f64,
+    /// Partners s of each candidate (step 5).
+    pub partners: usize,
+    /// Threads; the answer does not depend on them.
+    pub threads: usize,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { grid: 0.05, neighbours: 30, view: None, share: 0.7, agreement: 2.0, partners: 100, threads: 1 }
+    }
+}
+
+/// The silo's axis in one frame, with the evidence for it.
+#[derive(Debug, Clone)]
+pub struct Located {
+    /// Pose of the camera in the silo.
+    pub pose: SiloPose,
+    /// Covariance of r_x, r_y, t_x and t_y.
+    pub covariance: Matrix4<f64>,
+    /// Radius and cone, as far as they are seen.
+    pub profile: Profile,
+    /// What is seen, by pixels and by area.
+    pub coverage: Coverage,
+    /// Why to believe it.
+    pub evidence: Evidence,
+    /// Milliseconds of the steps.
+    pub timing: Vec<(&'static str, f64)>,
+}
+
+/// The axis, or why there is none.
+pub type Outcome = std::result::Result<Located, Refusal>;
+
+/// Finds the axis in a depth image.
+pub fn locate_in_image(image: &DepthImage, settings: &Settings) -> Result<Outcome> {
+    let (workers, mut clock) = (Workers::new(settings.threads), Clock::start());
+    let cloud = voxel_grid_of_image(image, settings.grid, &workers)?; // step 1, Eqs. 1 and 2
+    clock.lap("points");
+    locate_in_grid(cloud, &[View::Inside, View::Outside], settings, &workers, clock)
+}
+
+/// Finds the axis in a cloud of points in the camera frame.
+pub fn locate_in_points(points: &[Vec3], settings: &Settings) -> Result<Outcome> {
+    let (workers, mut clock) = (Workers::new(settings.threads), Clock::start());
+    let cloud = voxel_grid(points, settings.grid, &workers)?; // step 1
+    clock.lap("points");
+    locate_in_grid(cloud, &[View::Inside, View::Either, View::Outside], settings, &workers, clock)
+}
+
+/// What steps 1 and 2 make of a frame.
+struct Surface {
+    cloud: Cloud,
+    near: Neighbours,
+    normals: Vec<Vec3>,
+    tensors: Vec<ShapeTensor>,
+}
+
+fn locate_in_grid(
+    cloud: Cloud,
+    views: &[View],
+    settings: &Settings,
+    workers: &Workers,
+    mut clock: Clock,
+) -> Result<Outcome> {
+    let points = &cloud.points;
+    if points.len() <= settings.neighbours {
+        return Ok(Err(Refusal::NoDepth));
+    }
+    let near = nearest_neighbours(points, settings.neighbours, workers)?;
+    clock.lap("neighbours");
+    let normals = normals(points, &near, workers); // step 2, Hoppe
+    clock.lap("normals");
+    let tensors = shape_tensors(points, &near, &normals, workers); // step 2, Goldfeather and Interrante
+    clock.lap("shape tensors");
+    let surface = Surface { near, normals, tensors, cloud };
+    let chosen = settings.view.map(|view| [view]);
+    let views = chosen.as_ref().map_or(views, |view| view);
+    let mut outcomes = views.iter().map(|view| axis_seen_from(*view, &surface, settings, workers, &mut clock));
+    // Where no view gives an axis, the first one's reason is the one to tell.
+    let first = outcomes.next().unwrap_or(Err(Refusal::NoWall));
+    let outcome = first.or_else(|refusal| outcomes.find_map(Outcome::ok).ok_or(refusal));
+    drop(outcomes);
+    Ok(outcome.map(|located| Located { timing: clock.laps, ..located }))
+}
+
+/// Steps 3 to 6.
+fn axis_seen_from(view: View, surface: &Surface, settings: &Settings, workers: &Workers, clock: &mut Clock) -> Outcome {
+    let Surface { cloud, near, normals, tensors } = surface;
+    let points = &cloud.points;
+    let candidates = select_candidates(points, near, tensors, settings.share, view, workers); // step 3
+    clock.lap("candidates");
+    let consensus = consistent_direction(&candidates, settings.agreement); // step 4, Eq. 3
+    clock.lap("direction");
+    let wall = |c: &Candidate| Wall { p: points[c.index], normal: normals[c.index] };
+    let walls: Vec<Wall> = consensus.kept.iter().map(wall).collect();
+    let x = consensus.direction.x;
+    let estimates = axis_points(&walls, &x, settings.partners, workers); // step 5, Eq. 4
+    let a = axis_point(&estimates, workers).ok_or(Refusal::NoWall)?;
+    clock.lap("point");
+    let pose = SiloPose { t_x: -a.x, t_y: -a.y, ..SiloPose::from_axis(&x, &Vec3::zeros()) }; // step 6, Eqs. 6, 7
+    let outcome = assess(surface, &Found { pose, view, candidates, consensus, estimates }, settings, workers);
+    clock.lap("evidence");
+    outcome
+}
+
+/// What the six steps found.
+struct Found {
+    pose: SiloPose,
+    view: View,
+    candidates: Vec<Candidate>,
+    consensus: Consensus,
+    estimates: Vec<AxisPoint>,
+}
+
+/// What the paper leaves out: how sure the answer is, whether to give it, and what the frame shows.
+fn assess(surface: &Surface, found: &Found, settings: &Settings, workers: &Workers) -> Outcome {
+    let walls = placed_walls(&found.consensus.kept, &surface.cloud.points, &surface.normals, &found.pose);
+    let side = BLOCK * settings.grid * (settings.neighbours as f64).sqrt();
+    let (seen, covariance) =
+        workers.join(|| shown(surface, &found.pose, side, settings.grid), || covariance(found, &walls, side));
+    let (profile, coverage) = seen?;
+    let counts = [surface.cloud.points.len(), found.candidates.len()];
+    let evidence = Evidence::of(&walls, counts, found.consensus.direction.spread, coverage.share_behind());
+    evidence.judge(found.view)?;
+    profile.judge(&found.pose, found.view)?;
+    Ok(Located { pose: found.pose, covariance: covariance?, profile, coverage, evidence, timing: Vec::new() })
+}
+
+/// The silo's profile about the axis, and what the frame shows of it.
+fn shown(
+    surface: &Surface,
+    pose: &SiloPose,
+    side: f64,
+    grid: f64,
+) -> std::result::Result<(Profile, Coverage), Refusal> {
+    let see = |profile: &Profile| {
+        let tolerance = 4.0 * profile.misfit + 0.25 * grid;
+        coverage(&surface.cloud, &surface.normals, pose, profile, tolerance)
+    };
+    let profile = fit_profile(&surface.cloud.points, &surface.normals, pose, side);
+    let coverage = see(&profile);
+    if !profile.cone_may_be_feed() || coverage.is_apex_covered() {
+        return Ok((profile, coverage));
+    }
+    let cylinder = Profile { cone: None, ..profile };
+    if cylinder.radius.is_some() { Ok((cylinder, see(&cylinder))) } else { Err(Refusal::ConeMayBeFeed) }
+}
+
+/// Covariance of the pose by the scatter among the walls' blocks.
+fn covariance(found: &Found, walls: &[PlacedWall], side: f64) -> std::result::Result<Matrix4<f64>, Refusal> {
+    let (block, blocks) = blocks(walls.iter().map(|w| w.p), side);
+    let turn = found.pose.rotation();
+    let scatter = Scatter {
+        pose: &found.pose,
+        e1: &walls.iter().map(|w| w.e1).collect::<Vec<_>>(),
+        estimates: &found.estimates,
+        block: &block,
+        blocks,
+        height: walls.iter().map(|w| w.p.z).sum::<f64>() / walls.len() as f64,
+        candidates: &found.candidates.iter().map(|c| turn * c.e1).collect::<Vec<_>>(),
+        limit: found.consensus.limit,
+    };
+    scatter.covariance()
+}
+
+/// Side of the blocks whose errors are independent, in units of grid·√k: a neighbourhood's diameter.
+const BLOCK: f64 = 1.15;
+
+/// Milliseconds between the steps.
+struct Clock {
+    last: Instant,
+    laps: Vec<(&'static str, f64)>,
+}
+
+impl Clock {
+    fn start() -> Self {
+        Self { last: Instant::now(), laps: Vec::new() }
+    }
+
+    /// Adds the time since the last lap to a step's.
+    fn lap(&mut self, step: &'static str) {
+        let elapsed = self.last.elapsed().as_secs_f64() * 1e3;
+        match self.laps.iter_mut().find(|(name, _)| *name == step) {
+            Some((_, time)) => *time += elapsed,
+            None => self.laps.push((step, elapsed)),
+        }
+        self.last = Instant::now();
+    }
+}

@@ -1,0 +1,404 @@
+//! The surface fit: a depth frame in, the silo's wall as cylinder and cone out, with its covariance.
+
+pub mod bow;
+pub mod cloud_tiles;
+pub mod common;
+pub mod covariance;
+pub mod diagnostics;
+pub mod grain;
+mod misfit;
+pub mod model_selection;
+pub mod outermost;
+pub mod parts;
+pub mod polish;
+pub mod proposals;
+pub mod residual;
+pub mod segmentation;
+pub mod solver;
+pub mod taper;
+pub mod tiles;
+pub mod vertex;
+pub mod warm_start;
+
+use crate::Result;
+use crate::Vec3;
+use crate::base::refusal::Refusal;
+use crate::base::workers::Workers;
+use crate::fusion::frame_factor::{FrameShare, among};
+use crate::fusion::relinearize::{parameters_of, some_rays};
+use crate::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
+use crate::geometry::vessel::{Information, OVALITY, PARAMETERS, Parameters, PlacedSurface, Reach};
+use crate::surface_fit::bow::bow_uncertainty;
+use crate::surface_fit::cloud_tiles::cloud_patches;
+use crate::surface_fit::common::lasting_misfit;
+use crate::surface_fit::covariance::{
+    relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened,
+};
+use crate::surface_fit::diagnostics::WallEvidence;
+use crate::surface_fit::grain::relief_with_grain;
+use crate::surface_fit::model_selection::{Settled, coarse_fit, drop_film, may_be_feed};
+use crate::surface_fit::parts::change_without_a_part;
+use crate::surface_fit::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
+use crate::surface_fit::solver::{Fit, OVALITY_STD, Prior, Problem, free_parameters, tukey};
+use crate::surface_fit::tiles::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
+use crate::surface_fit::warm_start::{KnownWall, confirmed};
+
+/// What the caller knows.
+#[derive(Debug, Clone)]
+pub struct Knowledge {
+    /// The sensor's depth error.
+    pub error: DepthError,
+    /// Radius of the cylinder and its standard deviation, metres.
+    pub radius: Option<(f64, f64)>,
+    /// Direction of gravity in the camera frame and its standard deviation, radians.
+    pub gravity: Option<(Vec3, f64)>,
+}
+
+/// Result of the fit, before it is judged.
+#[derive(Debug, Clone)]
+pub struct SurfaceFit {
+    /// State: surface, bias, misfit.
+    pub fit: Fit,
+    /// Covariance over all parameters; zero rows for those that are not free.
+    pub covariance: Information,
+    /// What this frame alone says, without priors (for fusing frames).
+    pub share: FrameShare,
+    /// Which parameters are estimated.
+    pub free: [bool; PARAMETERS],
+    /// Noise law used.
+    pub noise: NoiseLaw,
+    /// Residual scatter over expectation (reduced chi-square) of the tiles.
+    pub chi_square: f64,
+    /// What the wall looks like.
+    pub evidence: WallEvidence,
+    /// The wall as patches show it, for other frames of the same camera.
+    pub wall: KnownWall,
+    /// The patches.
+    pub patches: Patches,
+    /// Final residual of each wall patch across the wall, metres; NaN elsewhere.
+    pub residuals: Vec<f64>,
+    /// Milliseconds of each stage, in order.
+    pub timing: Vec<(&'static str, f64)>,
+}
+
+/// How far a wall that shows ovality, and so is no ideal one, lies off its mean over a block of tiles, metres.
+const WALL_FORM: f64 = 2.5e-4;
+/// The same as a multiple of the misfit that the tiles show: what stuck feed and dents do to neighbouring tiles alike.
+const MISFIT_FORM: f64 = 2.0;
+
+/// Misfit that chance alone shows on a smooth wall, metres.
+const CHANCE_MISFIT: f64 = 2e-4;
+
+/// Largest share of the wall that dents and seams put before it; where it is more, feed sticks to it.
+const DENTED: f64 = 0.06;
+/// How thick the feed is that sticks to such a wall unnoticed, metres.
+const FILM_FORM: f64 = 1e-3;
+
+/// How far the wall may lie off its mean over a block of tiles, metres.
+fn form(misfit: f64, oval: bool) -> f64 {
+    MISFIT_FORM * (misfit - CHANCE_MISFIT).max(0.0) + if oval { WALL_FORM } else { 0.0 }
+}
+
+/// Fits the wall to a depth image; where another frame of the camera has shown a wall, it is looked for there first.
+pub fn fit_image(image: &DepthImage, know: &Knowledge, known: Option<&KnownWall>) -> Outcome {
+    let mut clock = Clock::start();
+    let mut patches = tile_patches(image, know.error.noise.as_ref());
+    if patches.list.len() < 30 {
+        return Err(Refusal::NoDepth);
+    }
+    patches.unbias_normals(&know.error.bias);
+    clock.lap("patches");
+    let (noise, prior, pixel) = (noise(&patches, know), prior(know), pixel_size(image));
+    let confirmed = known.and_then(|wall| {
+        let found = confirmed(&mut patches, noise, &prior, pixel, wall);
+        clock.lap("known wall");
+        let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
+        measured(problem, image, know, found?, Looks::None, &mut clock).ok().filter(|fit| fit.confirms(wall))
+    });
+    let mut result = match confirmed {
+        Some(fit) => fit,
+        None => {
+            patches.unbias_normals(&know.error.bias);
+            let found = coarse_fit(&mut patches, noise, &prior, pixel)?;
+            clock.lap("coarse fit");
+            let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
+            measured(problem, image, know, found, Looks::Usual, &mut clock)?
+        }
+    };
+    result.timing = clock.laps;
+    result.patches = patches;
+    Ok(result)
+}
+
+/// The wall that patches have settled on, measured by its pixels.
+fn measured(
+    problem: Problem,
+    image: &DepthImage,
+    know: &Knowledge,
+    found: Settled,
+    looks: Looks,
+    clock: &mut Clock,
+) -> Outcome {
+    let mut known = KnownWall::of(&found);
+    let Settled { mut fit, wall, evidence, bare } = found;
+    let round = fit.surface.ovality == [0.0; 2];
+    let prior = if round { problem.prior.clone() } else { problem.prior.with_ovality() };
+    let problem = Problem { prior: &prior, ..problem };
+    if let (Some((radius, _)), true) = (know.radius, prior.bias_std[1] > 0.0) {
+        fit.rescale_to(radius); // few patches of the cylinder tell the scale, though they leave its radius open
+    }
+    fit.surface = fit.surface.without(bare);
+    drop_film(&problem, &mut fit, &wall);
+    known.drop_parts_without(&fit.surface);
+    let (noise, mut equations) = on_pixels(problem, image, &mut fit, &wall, know.error.noise, looks);
+    let problem = Problem { noise, ..problem };
+    if may_be_feed(&problem, &fit) {
+        // on its pixels the cone is less steep than on patches
+        fit.surface.radius.ok_or(Refusal::ConeMayBeFeed)?;
+        fit.surface.cone = None;
+        known.drop_parts_without(&fit.surface);
+        (_, equations) = on_pixels(problem, image, &mut fit, &wall, Some(noise), Looks::Usual);
+    }
+    let oval = prior.with_ovality();
+    known.oval = !round || shows_ovality(&problem, &fit, &mut equations, OVALITY_STD);
+    let problem = if known.oval { Problem { prior: &oval, ..problem } } else { problem };
+    if known.oval && round {
+        (_, equations) = on_pixels(problem, image, &mut fit, &wall, Some(noise), Looks::Usual);
+    }
+    clock.lap("pixels");
+    let relief = if know.error.noise.is_some() { relief(&equations) } else { relief_beside_noise(&equations) };
+    let relief = relief_with_grain(&problem, image, &fit, &equations, relief);
+    let mut result = finish(&problem, fit.clone(), &mut equations, (evidence, known), relief)?;
+    for _ in 0..MOST_ROUNDS {
+        if result.fit.surface.is_near(&fit.surface, &LINEAR) {
+            break;
+        }
+        fit = result.fit;
+        equations = pixel_equations(&problem, image, &fit, &wall, &ALL);
+        result = finish(&problem, fit.clone(), &mut equations, (evidence, known), relief)?;
+    }
+    clock.lap("covariance");
+    Ok(result)
+}
+
+/// So near to where they were made equations are as good as linear: what is left out is a hundredth of the step.
+const LINEAR: Reach = Reach { tilt: 0.003, shift: 0.01, radius: 0.01, slope: 0.1, apex: 0.1 };
+/// So often equations are made anew where the answer is further away, as it is where a frame leaves much open.
+const MOST_ROUNDS: usize = 4;
+
+/// How often the pixels are looked at before they are all asked.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Looks {
+    /// As often as it takes from a wall found on patches.
+    Usual,
+    /// Not where the noise is known: the wall lies so near the answer that its equations are as good as linear.
+    None,
+}
+
+/// Steps on some of the pixels, then the equations of all; and the noise law, from the residuals where none is known.
+fn on_pixels(
+    mut problem: Problem,
+    image: &DepthImage,
+    fit: &mut Fit,
+    wall: &[bool],
+    known: Option<NoiseLaw>,
+    looks: Looks,
+) -> (NoiseLaw, Vec<TileEquation>) {
+    let reaches: &[f64] = match (known, looks) {
+        (Some(_), Looks::None) => &[],
+        (Some(_), Looks::Usual) => &[3.0],
+        (None, _) => &[3.0, 2.0], // a noise law asks for a second look
+    };
+    for &reach in reaches {
+        problem.noise = polish(&problem, image, fit, wall, reach, known);
+    }
+    (problem.noise, pixel_equations(&problem, image, fit, wall, &ALL))
+}
+
+/// Largest standard deviation of the axis' direction that still is an answer, radians.
+const MAX_DIRECTION_STD: f64 = 0.02;
+/// Largest standard deviation of the axis' position that still is an answer, as a share of the radius.
+const MAX_POSITION_STD: f64 = 0.05;
+
+impl SurfaceFit {
+    /// Centres of the patches in the silo frame, freed from the depth bias: what the r–z profile shows.
+    pub fn patch_points(&self) -> Vec<Vec3> {
+        let placed = PlacedSurface::new(self.fit.surface);
+        let to_silo = |p: &Patch| {
+            let d = if self.patches.cloud { 0.0 } else { self.fit.bias.true_depth(p.measured) };
+            placed.to_silo(&p.at(d))
+        };
+        self.patches.list.iter().map(to_silo).collect()
+    }
+
+    /// Whether it shows a known wall again: the same parts in the same place, and oval if that was.
+    fn confirms(&self, wall: &KnownWall) -> bool {
+        self.wall.oval == wall.oval && wall.is_same(&self.wall.surface)
+    }
+
+    /// Whether most of the wall's normals, turned towards the origin, point to the axis.
+    fn is_seen_from_inside(&self) -> bool {
+        let placed = PlacedSurface::new(self.fit.surface);
+        let wall = self.residuals.iter().zip(&self.patches.list).filter(|(r, _)| r.is_finite());
+        let inwards = |p: &Patch| placed.turn(&p.normal).dot(&placed.local(&p.origin).gradient) < 0.0;
+        let votes: i64 = wall.map(|(_, p)| if inwards(p) { 1 } else { -1 }).sum();
+        votes > 0
+    }
+}
+
+/// A fit, or why there is none.
+pub type Outcome = std::result::Result<SurfaceFit, Refusal>;
+
+/// Fits the wall to a cloud of points in the camera's frame, thinned by a voxel grid with cells of `grid` metres.
+///
+/// A cloud may be seen from inside or outside, and its origin need not be a camera: residuals are distances from the
+/// wall, weighed by each patch's own scatter, and normals have no sign.
+pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge) -> Result<Outcome> {
+    let mut clock = Clock::start();
+    let mut patches = cloud_patches(points, grid, workers)?;
+    if patches.list.len() < 30 {
+        return Ok(Err(Refusal::NoDepth));
+    }
+    clock.lap("patches");
+    let exact = DepthError { bias: DepthBias::default(), bias_std: [0.0; 3], noise: None };
+    let prior = prior(&Knowledge { error: exact, ..know.clone() });
+    let noise = NoiseLaw::uniform(1e-3); // not used: patches of a cloud carry their own scatter
+    let found = match coarse_fit(&mut patches, noise, &prior, 0.0) {
+        Ok(found) => found,
+        Err(refusal) => return Ok(Err(refusal)),
+    };
+    let known = KnownWall::of(&found);
+    let Settled { mut fit, wall, evidence, bare } = found;
+    clock.lap("coarse fit");
+    let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
+    fit.surface = fit.surface.without(bare);
+    let mut equations = patch_equations(&problem, &fit, &wall);
+    let relief = relief_beside_noise(&equations);
+    let mut result = match finish(&problem, fit, &mut equations, (evidence, known), relief) {
+        Ok(found) => found,
+        Err(refusal) => return Ok(Err(refusal)),
+    };
+    clock.lap("covariance");
+    result.timing = clock.laps;
+    result.patches = patches;
+    result.fit.inside = result.is_seen_from_inside();
+    Ok(Ok(result))
+}
+
+fn noise(patches: &Patches, know: &Knowledge) -> NoiseLaw {
+    know.error.noise.unwrap_or_else(|| {
+        let smooth = patches.list.iter().filter(|p| p.smooth);
+        noise_from_scatter(&mut smooth.map(|p| (p.measured, p.scatter)).collect::<Vec<_>>(), 1e-4)
+    })
+}
+
+fn pixel_size(image: &DepthImage) -> f64 {
+    let (first, last) = (image.rays[0], image.rays[image.width - 1]);
+    (last[0] - first[0]).abs() / (image.width - 1).max(1) as f64
+}
+
+fn prior(know: &Knowledge) -> Prior {
+    let mut bias_std = know.error.bias_std;
+    if know.radius.is_some() && bias_std[1] > 0.0 {
+        bias_std[1] = bias_std[1].max(0.05); // a known radius fixes the scale better than any expectation
+    }
+    Prior { bias: know.error.bias, bias_std, radius: know.radius, gravity: know.gravity, ovality_std: 0.0 }
+}
+
+/// Whether the axis is known well enough: its direction, and its position in the middle of the wall that was seen.
+fn check_determined(covariance: &Information, placed: &PlacedSurface, height: f64) -> std::result::Result<(), Refusal> {
+    let [x, y] = placed.axis_shift(height);
+    let variance = |row: &Parameters| row.dot(&(covariance * row));
+    let direction = (covariance[(0, 0)] + covariance[(1, 1)]).sqrt();
+    let position = (variance(&x) + variance(&y)).sqrt();
+    match (direction < MAX_DIRECTION_STD, position < MAX_POSITION_STD * placed.surface.size()) {
+        (true, true) => Ok(()),
+        (true, false) => Err(Refusal::PositionUnknown),
+        (false, true) => Err(Refusal::DirectionUnknown),
+        (false, false) => Err(Refusal::PoorlyDetermined),
+    }
+}
+
+/// Last solution, covariance and residuals.
+fn finish(
+    problem: &Problem,
+    mut fit: Fit,
+    tiles: &mut [TileEquation],
+    (evidence, wall): (WallEvidence, KnownWall),
+    relief: f64,
+) -> Outcome {
+    let base = parameters_of(&fit.surface, &fit.bias);
+    let system = solve_equations(problem, &mut fit, tiles, 4).ok_or(Refusal::PoorlyDetermined)?;
+    let pulls: Vec<f64> = tiles.iter().map(TileEquation::pull).collect();
+    let free = free_parameters(&fit, &system.prior);
+    let joint = if problem.patches.cloud { system } else { system.with_ovality(OVALITY_STD) };
+    let (model, jointly_free) = joint.covariance(&fit).ok_or(Refusal::PoorlyDetermined)?;
+    let mut covariance = widened(problem, &model, &joint, (tiles, &pulls));
+    let lasting = lasting_misfit(problem.patches, fit.misfit, tiles);
+    let form = form(lasting, free[OVALITY]);
+    let off_by = |form: f64| relief_uncertainty(&joint, &fit, tiles, (relief, form));
+    let film = if evidence.stuck > DENTED { off_by(form.max(FILM_FORM)) } else { Information::zeros() };
+    covariance += off_by(form);
+    let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
+    let placed = PlacedSurface::new(fit.surface);
+    check_determined(&covariance, &placed, heights / tiles.len().max(1) as f64)?;
+    covariance += film + bow_uncertainty(&fit, tiles); // these widen an answer, but take none away
+    if let Some(change) = change_without_a_part(&fit, &joint, (&model, &covariance), (tiles, &pulls), free[OVALITY]) {
+        covariance += change * change.transpose();
+    }
+    let bias_is_free = free[7..OVALITY].contains(&true);
+    let rays = if bias_is_free { some_rays(tiles, |patch| problem.patches.list[patch].q) } else { Vec::new() };
+    let share = FrameShare::new((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free), (base, rays));
+    let mut covariance = among(&covariance, &free);
+    if !free[8] {
+        covariance += scale_uncertainty(&fit, problem.prior.bias_std[1]);
+    }
+    let (residuals, chi_square) = residuals(tiles, problem.patches.list.len());
+    Ok(SurfaceFit {
+        covariance,
+        share,
+        free,
+        noise: problem.noise,
+        chi_square,
+        evidence,
+        wall,
+        patches: Patches::default(),
+        residuals,
+        fit,
+        timing: Vec::new(),
+    })
+}
+
+/// Residual of each of n patches across the wall, NaN where it does not count, and their reduced chi-square.
+fn residuals(tiles: &[TileEquation], n: usize) -> (Vec<f64>, f64) {
+    let mut residuals = vec![f64::NAN; n];
+    let (mut chi, mut weights) = (0.0, 0.0);
+    for TileEquation { patch, equation: e, .. } in tiles {
+        let squared = e.residual * e.residual / e.variance;
+        let weight = tukey(squared);
+        if weight > 0.0 {
+            residuals[*patch] = e.residual * e.cosine;
+        }
+        chi += weight * squared;
+        weights += weight;
+    }
+    (residuals, chi / f64::max(weights, 1.0))
+}
+
+/// Milliseconds of the stages.
+struct Clock {
+    last: std::time::Instant,
+    laps: Vec<(&'static str, f64)>,
+}
+
+impl Clock {
+    fn start() -> Self {
+        Self { last: std::time::Instant::now(), laps: Vec::new() }
+    }
+
+    fn lap(&mut self, name: &'static str) {
+        let now = std::time::Instant::now();
+        self.laps.push((name, (now - self.last).as_secs_f64() * 1e3));
+        self.last = now;
+    }
+}

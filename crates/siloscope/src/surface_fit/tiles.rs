@@ -1,0 +1,572 @@
+//! Patches: the frame in small pieces, each with its mean position, its normal and how sure both are.
+//!
+//! A depth image is cut into square tiles and a plane is fitted to each, against pixels that don't belong to it
+//! (dust, edges). Everything up to the last step of the surface fit works on a few thousand patches, not pixels.
+
+use crate::Vec3;
+use crate::geometry::sensor::{DepthBias, NoiseLaw};
+use crate::shape_tensor::axis::{MEDIAN_OF_CHI_SQUARE, median};
+
+/// A small piece of surface.
+#[derive(Debug, Clone, Copy)]
+pub struct Patch {
+    /// Direction along which the position is uncertain: the ray with z = 1 (image), the normal (cloud).
+    pub q: Vec3,
+    /// Measured position along `q` of the patch's centre: depth (image); 0 (cloud).
+    pub measured: f64,
+    /// Where `q` starts: the camera (image), the mean point (cloud).
+    pub origin: Vec3,
+    /// Unit normal towards the camera.
+    pub normal: Vec3,
+    /// Standard deviation of the normal's direction, radians.
+    pub sigma_normal: f64,
+    /// Scatter of the single measurements about the patch's plane, metres along `q`.
+    pub scatter: f64,
+    /// Number of measurements.
+    pub count: f64,
+    /// Whether one plane describes the patch.
+    pub smooth: bool,
+    /// Position in the grid of tiles (column, row); (0, 0) for clouds.
+    pub tile: (u32, u32),
+}
+
+impl Patch {
+    /// The centre for a given value along `q`.
+    #[inline]
+    pub fn at(&self, s: f64) -> Vec3 {
+        self.origin + self.q * s
+    }
+}
+
+/// What only the tile of an image has: its rays, and how its depth changes.
+#[derive(Debug, Clone, Copy)]
+pub struct TileRays {
+    /// Rays `(x/z, y/z)` of the first row's first and last pixel, then of the last row's.
+    corners: [[f64; 2]; 4],
+    /// Ray of the centre.
+    centre: [f64; 2],
+    /// Change of the measured depth per pixel along the image's rows and columns, over the tile and its neighbours.
+    slopes: [f64; 2],
+    /// The same over the tile alone.
+    pub own_slopes: [f64; 2],
+}
+
+/// Places of two of a patch's eight neighbours.
+pub const RIGHT: usize = 4;
+/// The one below.
+pub const DOWN: usize = 6;
+
+/// No neighbour: outside the image, or without depth.
+pub const NONE: u32 = u32::MAX;
+
+/// The patches of a frame and who lies beside whom.
+#[derive(Debug, Clone, Default)]
+pub struct Patches {
+    /// The patches.
+    pub list: Vec<Patch>,
+    /// Their rays (images).
+    pub rays: Vec<TileRays>,
+    /// The eight neighbours of each; `NONE` where there is none.
+    pub neighbours: Vec<[u32; 8]>,
+    /// Side of a tile in pixels (images).
+    pub side: usize,
+    /// Tiles per row (images).
+    pub columns: usize,
+    /// Variance of a tile's mean over that of as many independent pixels (images).
+    pub common_noise: f64,
+    /// Whether these come from a cloud without rays.
+    pub cloud: bool,
+}
+
+/// A depth image: rays and depths in metres, row by row; depths that are not positive or not finite are missing.
+#[derive(Debug, Clone, Copy)]
+pub struct DepthImage<'a> {
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Ray `(x/z, y/z)` of each pixel.
+    pub rays: &'a [[f64; 2]],
+    /// Depth of each pixel, metres.
+    pub depth: &'a [f32],
+}
+
+impl DepthImage<'_> {
+    /// Depths of up to N pixels from `start` on, 0 beyond `side`.
+    #[inline(always)]
+    pub(crate) fn row<const N: usize>(&self, start: usize, side: usize) -> [f32; N] {
+        let depths = &self.depth[start..start + side];
+        let mut row = [0.0; N];
+        if let Some(whole) = depths.first_chunk::<N>() {
+            row = *whole;
+        } else {
+            row.iter_mut().zip(depths).for_each(|(to, &from)| *to = from);
+        }
+        row
+    }
+}
+
+/// Sums of a plane fit z = a + b·u + c·v over pixels, u and v relative to the tile's centre.
+#[derive(Debug, Clone, Copy, Default)]
+struct Sums {
+    n: f64,
+    u: f64,
+    v: f64,
+    uu: f64,
+    uv: f64,
+    vv: f64,
+    z: f64,
+    uz: f64,
+    vz: f64,
+    zz: f64,
+}
+
+/// Pixels of a row that are added together.
+const LANES: usize = 4;
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Plane {
+    a: f64,
+    b: f64,
+    c: f64,
+}
+
+impl Sums {
+    #[inline]
+    fn add(&mut self, u: f64, v: f64, z: f64) {
+        self.n += 1.0;
+        self.u += u;
+        self.v += v;
+        self.uu += u * u;
+        self.uv += u * v;
+        self.vv += v * v;
+        self.z += z;
+        self.uz += u * z;
+        self.vz += v * z;
+        self.zz += z * z;
+    }
+
+    /// Adds a row of pixels at v, whose u are counted from `centre`.
+    #[inline]
+    fn add_row(&mut self, v: f64, centre: f64, depths: &[f32]) {
+        let is_there = |z: f32| (z > 0.0) & (z < f32::INFINITY);
+        if !depths.iter().fold(true, |all, &z| all & is_there(z)) {
+            for (u, &z) in depths.iter().enumerate().filter(|(_, z)| is_there(**z)) {
+                self.add(u as f64 - centre, v, f64::from(z));
+            }
+            return;
+        }
+        let (mut z, mut uz, mut zz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let (whole, rest) = depths.as_chunks::<LANES>();
+        for (four, depths) in whole.iter().enumerate() {
+            for lane in 0..LANES {
+                let depth = f64::from(depths[lane]);
+                z[lane] += depth;
+                uz[lane] += ((four * LANES + lane) as f64 - centre) * depth;
+                zz[lane] += depth * depth;
+            }
+        }
+        for (lane, &depth) in rest.iter().enumerate() {
+            let depth = f64::from(depth);
+            z[lane] += depth;
+            uz[lane] += ((whole.len() * LANES + lane) as f64 - centre) * depth;
+            zz[lane] += depth * depth;
+        }
+        let n = depths.len() as f64;
+        let of_row: f64 = z.iter().sum();
+        self.n += n;
+        self.uu += n * (n * n - 1.0) / 12.0;
+        self.v += n * v;
+        self.vv += n * v * v;
+        self.z += of_row;
+        self.uz += uz.iter().sum::<f64>();
+        self.vz += v * of_row;
+        self.zz += zz.iter().sum::<f64>();
+    }
+
+    /// Adds a neighbour's sums, whose centre lies at (du, dv) from ours.
+    fn add_shifted(&mut self, o: &Sums, du: f64, dv: f64) {
+        self.n += o.n;
+        self.u += o.u + du * o.n;
+        self.v += o.v + dv * o.n;
+        self.uu += o.uu + 2.0 * du * o.u + du * du * o.n;
+        self.uv += o.uv + du * o.v + dv * o.u + du * dv * o.n;
+        self.vv += o.vv + 2.0 * dv * o.v + dv * dv * o.n;
+        self.z += o.z;
+        self.uz += o.uz + du * o.z;
+        self.vz += o.vz + dv * o.z;
+        self.zz += o.zz;
+    }
+
+    /// Least-squares plane; `None` for pixels on a line or a point.
+    fn plane(&self) -> Option<Plane> {
+        let (mu, mv, mz) = (self.u / self.n, self.v / self.n, self.z / self.n);
+        let (uu, uv, vv) = (self.uu - mu * self.u, self.uv - mu * self.v, self.vv - mv * self.v);
+        let (uz, vz) = (self.uz - mu * self.z, self.vz - mv * self.z);
+        let det = uu * vv - uv * uv;
+        if !(det > 0.05 * uu * vv && det > 1e-9) {
+            return None;
+        }
+        let (b, c) = ((uz * vv - vz * uv) / det, (vz * uu - uz * uv) / det);
+        Some(Plane { a: mz - b * mu - c * mv, b, c })
+    }
+
+    /// Root-mean-square distance of the pixels from a plane that was fitted to them.
+    fn scatter(&self, p: &Plane) -> f64 {
+        let residual = self.zz - p.a * self.z - p.b * self.uz - p.c * self.vz;
+        (residual.max(0.0) / (self.n - 3.0).max(1.0)).sqrt()
+    }
+}
+
+/// Side of the tiles: about 80 of them across the image, or as few as 40 where they would be narrower than 8 pixels.
+pub fn tile_side(width: usize) -> usize {
+    let across = |tiles: f64| (width as f64 / tiles).round() as usize;
+    across(80.0).max(across(40.0).min(8)).clamp(4, MAX_SIDE)
+}
+
+/// Largest side of a tile, pixels.
+pub const MAX_SIDE: usize = 16;
+
+/// Cuts a depth image into tiles. `noise` is the expected noise where it is known.
+pub fn tile_patches(image: &DepthImage, noise: Option<&NoiseLaw>) -> Patches {
+    let side = tile_side(image.width);
+    let (columns, rows) = (image.width / side, image.height / side);
+    let place = |i: usize| ((i % columns) * side, (i / columns) * side);
+    let mut tiles = tiles(image, side, (columns, rows));
+    let law = noise.copied().unwrap_or_else(|| noise_of(&tiles));
+    for (i, tile) in tiles.iter_mut().enumerate() {
+        if let Some(rough) = tile.filter(|t| t.scatter > 1.5 * law.sigma(t.depth()) + 3e-4 * t.depth()) {
+            *tile = Some(robust_tile(image, place(i), side).unwrap_or(rough));
+        }
+    }
+    let common_noise = common_noise(&tiles, columns, &law);
+    let n = tiles.iter().flatten().count();
+    let (list, rays) = (Vec::with_capacity(n), Vec::with_capacity(n));
+    let mut patches = Patches { list, rays, side, columns, common_noise, ..Patches::default() };
+    let mut index = vec![NONE; columns * rows];
+    for (i, index) in index.iter_mut().enumerate() {
+        if let Some((patch, rays)) =
+            patch(image, &tiles, (i % columns, i / columns), (columns, rows), (side, common_noise))
+        {
+            *index = patches.list.len() as u32;
+            patches.list.push(patch);
+            patches.rays.push(rays);
+        }
+    }
+    patches.neighbours = patches.list.iter().map(|p| neighbours(&index, p.tile, columns, rows)).collect();
+    patches
+}
+
+fn noise_of(tiles: &[Option<Tile>]) -> NoiseLaw {
+    let mut samples: Vec<(f64, f64)> = tiles.iter().flatten().map(|t| (t.depth(), t.scatter)).collect();
+    noise_from_scatter(&mut samples, 1e-4)
+}
+
+/// Most relief that walls have, metres: corrugated sheet 13 mm deep has 4.6 mm. What scatters more is the sensor.
+pub const DEEPEST: f64 = 5e-3;
+
+/// Variance of a tile's mean over that of as many independent pixels; 1 where they are independent.
+///
+/// What neighbouring pixels' noise has in common does not average out within a tile. Third differences between the tiles
+/// of a row show it: a smooth surface has next to none, edges are few, and no wall's relief makes more than `DEEPEST`.
+fn common_noise(tiles: &[Option<Tile>], columns: usize, law: &NoiseLaw) -> f64 {
+    const PLAIN: f64 = 1.5; // chance and the surface's own shape reach this
+    let ratio = |relief: f64| {
+        let rows = tiles.chunks(columns.max(1)); // none in an image smaller than a tile
+        let differences = rows.flat_map(|row| row.windows(4).filter_map(|four| third_difference(four, law, relief)));
+        median(differences.collect()).unwrap_or(1.0)
+    };
+    if ratio(DEEPEST) > PLAIN { ratio(0.0) } else { 1.0 }
+}
+
+/// Square of the third difference of four tiles' depths over what is expected of independent noise and of relief.
+fn third_difference(four: &[Option<Tile>], law: &NoiseLaw, relief: f64) -> Option<f64> {
+    let [Some(a), Some(b), Some(c), Some(d)] = four else { return None };
+    let bend = a.plane.a - d.plane.a + 3.0 * (c.plane.a - b.plane.a);
+    let variance = |t: &Tile| law.sigma(t.depth()).powi(2) / t.sums.n + relief * relief;
+    let expected = variance(a) + 9.0 * (variance(b) + variance(c)) + variance(d);
+    Some(bend * bend / (MEDIAN_OF_CHI_SQUARE * expected))
+}
+
+/// A tile's sums, its plane, and the pixels' scatter about it.
+#[derive(Debug, Clone, Copy)]
+struct Tile {
+    sums: Sums,
+    plane: Plane,
+    scatter: f64,
+}
+
+impl Tile {
+    fn of(sums: Sums) -> Option<Self> {
+        let plane = sums.plane()?;
+        Some(Self { sums, plane, scatter: sums.scatter(&plane) })
+    }
+
+    fn depth(&self) -> f64 {
+        self.sums.z / self.sums.n
+    }
+}
+
+/// The tiles of the image, row by row; `None` where too little was measured.
+fn tiles(image: &DepthImage, side: usize, (columns, rows): (usize, usize)) -> Vec<Option<Tile>> {
+    let enough = 0.3 * (side * side) as f64;
+    let centre = (side as f64 - 1.0) / 2.0;
+    let mut tiles = Vec::with_capacity(columns * rows);
+    let mut band = vec![Sums::default(); columns];
+    for row in 0..rows {
+        band.fill(Sums::default());
+        for v in 0..side {
+            // along the image's rows, as they lie in memory
+            let depths = &image.depth[(row * side + v) * image.width..][..columns * side];
+            for (sums, depths) in band.iter_mut().zip(depths.chunks_exact(side)) {
+                sums.add_row(v as f64 - centre, centre, depths);
+            }
+        }
+        tiles.extend(band.iter().map(|sums| if sums.n < enough { None } else { Tile::of(*sums) }));
+    }
+    tiles
+}
+
+/// Plane through the tile's majority: a start from the medians of its quadrants, then inliers only.
+fn robust_tile(image: &DepthImage, (u0, v0): (usize, usize), side: usize) -> Option<Tile> {
+    let centre = (side as f64 - 1.0) / 2.0;
+    let mut pixels = [(0.0f64, 0.0f64, 0.0f64); MAX_SIDE * MAX_SIDE];
+    let mut n = 0;
+    for v in 0..side {
+        for u in 0..side {
+            let z = image.depth[(v0 + v) * image.width + u0 + u];
+            if z > 0.0 && z < f32::INFINITY {
+                pixels[n] = (u as f64 - centre, v as f64 - centre, f64::from(z));
+                n += 1;
+            }
+        }
+    }
+    let pixels = &pixels[..n];
+    let mut plane = quadrant_plane(pixels)?;
+    let mut kept = None;
+    for _ in 0..3 {
+        let mut residuals: Vec<f64> =
+            pixels.iter().map(|p| (p.2 - plane.a - plane.b * p.0 - plane.c * p.1).abs()).collect();
+        let middle = residuals.len() / 2;
+        let (_, &mut median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
+        let limit = (3.0 * 1.4826 * median).max(1e-4);
+        let mut sums = Sums::default();
+        for p in pixels {
+            if (p.2 - plane.a - plane.b * p.0 - plane.c * p.1).abs() <= limit {
+                sums.add(p.0, p.1, p.2);
+            }
+        }
+        if sums.n < 0.55 * n as f64 {
+            return None;
+        }
+        let tile = Tile::of(sums)?;
+        plane = tile.plane;
+        kept = Some(tile);
+    }
+    kept
+}
+
+fn quadrant_plane(pixels: &[(f64, f64, f64)]) -> Option<Plane> {
+    let mut sums = Sums::default();
+    for quadrant in 0..4 {
+        let inside = |p: &&(f64, f64, f64)| usize::from(p.0 > 0.0) + 2 * usize::from(p.1 > 0.0) == quadrant;
+        let mut z: Vec<f64> = pixels.iter().filter(inside).map(|p| p.2).collect();
+        if z.is_empty() {
+            continue;
+        }
+        let n = z.len() as f64;
+        let u = pixels.iter().filter(inside).map(|p| p.0).sum::<f64>() / n;
+        let v = pixels.iter().filter(inside).map(|p| p.1).sum::<f64>() / n;
+        let middle = z.len() / 2;
+        let (_, &mut median, _) = z.select_nth_unstable_by(middle, f64::total_cmp);
+        sums.add(u, v, median);
+    }
+    if sums.n < 3.0 { None } else { sums.plane() }
+}
+
+/// The patch of one tile; its normal comes from the tile and those neighbours that continue its plane.
+fn patch(
+    image: &DepthImage,
+    tiles: &[Option<Tile>],
+    (column, row): (usize, usize),
+    (columns, rows): (usize, usize),
+    (side, common): (usize, f64),
+) -> Option<(Patch, TileRays)> {
+    let tile = tiles[row * columns + column].as_ref()?;
+    let Tile { sums: own, plane, scatter } = *tile;
+    let depth = tile.depth();
+    let step = side as f64;
+    let mut pooled = own;
+    let mut joined = 1;
+    for dv in -1i64..=1 {
+        for du in -1i64..=1 {
+            let (c, r) = (column as i64 + du, row as i64 + dv);
+            if (du, dv) == (0, 0) || c < 0 || r < 0 || c >= columns as i64 || r >= rows as i64 {
+                continue;
+            }
+            if let Some(Tile { sums: other, .. }) = &tiles[r as usize * columns + c as usize] {
+                let (u, v) = (du as f64 * step + other.u / other.n, dv as f64 * step + other.v / other.n);
+                let gap = other.z / other.n - plane.a - plane.b * u - plane.c * v;
+                if gap.abs() < 3.0 * scatter + 0.01 * depth {
+                    pooled.add_shifted(other, du as f64 * step, dv as f64 * step);
+                    joined += 1;
+                }
+            }
+        }
+    }
+    let wide = pooled.plane()?;
+    let (mu, mv) = (own.u / own.n, own.v / own.n);
+    let z = depth;
+    let rays = TileRays::of(image, row * side * image.width + column * side, side, [wide, plane]);
+    let steps = rays.steps(side);
+    let [q_u, q_v] = &steps;
+    let q = rays.mean() + q_u * mu + q_v * mv;
+    let (normal, length) = normal_of(&q, z, rays.slopes, &steps)?;
+    let spread = (pooled.uu - pooled.u * pooled.u / pooled.n).min(pooled.vv - pooled.v * pooled.v / pooled.n);
+    let sigma_slope = scatter * (common / spread.max(1e-9)).sqrt();
+    let sigma_normal = sigma_slope * z * (q_u.norm() + q_v.norm()) / 1.4 / length;
+    let patch = Patch {
+        q,
+        measured: z,
+        origin: Vec3::zeros(),
+        normal,
+        sigma_normal,
+        scatter,
+        count: own.n,
+        smooth: joined >= 3 && own.n >= 0.5 * step * step,
+        tile: (column as u32, row as u32),
+    };
+    Some((patch, rays))
+}
+
+/// Normal of the surface with depth z and slopes on ray q, towards the camera; and the length of the tangents' product.
+fn normal_of(q: &Vec3, z: f64, slopes: [f64; 2], steps: &[Vec3; 2]) -> Option<(Vec3, f64)> {
+    let normal = (q * slopes[0] + steps[0] * z).cross(&(q * slopes[1] + steps[1] * z));
+    let length = normal.norm();
+    let side = if normal.dot(q) > 0.0 { -1.0 } else { 1.0 };
+    (length > 0.0).then(|| (normal * (side / length), length))
+}
+
+impl Patches {
+    /// Works out the normals again for depths freed from their bias.
+    pub fn unbias_normals(&mut self, bias: &DepthBias) {
+        for (patch, rays) in self.list.iter_mut().zip(&self.rays) {
+            let d = bias.true_depth(patch.measured);
+            let slope = bias.slope(d);
+            let slopes = rays.slopes.map(|s| s / slope);
+            if let Some((normal, _)) = normal_of(&patch.q, d, slopes, &rays.steps(self.side)) {
+                patch.normal = normal;
+            }
+        }
+    }
+}
+
+impl TileRays {
+    /// Of the tile whose first pixel is `corner`.
+    #[inline]
+    fn of(image: &DepthImage, corner: usize, side: usize, planes: [Plane; 2]) -> Self {
+        let last = side - 1;
+        let at = |u: usize, v: usize| image.rays[corner + v * image.width + u];
+        let [slopes, own_slopes] = planes.map(|plane| [plane.b, plane.c]);
+        let (p, q) = (at(last / 2, last / 2), at(last.div_ceil(2), last.div_ceil(2)));
+        Self {
+            corners: [at(0, 0), at(last, 0), at(0, last), at(last, last)],
+            centre: [0.5 * (p[0] + q[0]), 0.5 * (p[1] + q[1])],
+            slopes,
+            own_slopes,
+        }
+    }
+
+    /// Mean of the corners' rays.
+    fn mean(&self) -> Vec3 {
+        let [nw, ne, sw, se] = &self.corners;
+        let mean = |k: usize| 0.25 * (nw[k] + ne[k] + sw[k] + se[k]);
+        Vec3::new(mean(0), mean(1), 1.0)
+    }
+
+    /// Change of the ray per pixel along the image's rows and columns.
+    pub fn steps(&self, side: usize) -> [Vec3; 2] {
+        let [nw, ne, sw, se] = &self.corners;
+        let scale = 0.5 / (side - 1) as f64;
+        let along = |k: usize| scale * (ne[k] + se[k] - nw[k] - sw[k]);
+        let down = |k: usize| scale * (sw[k] + se[k] - nw[k] - ne[k]);
+        [Vec3::new(along(0), along(1), 0.0), Vec3::new(down(0), down(1), 0.0)]
+    }
+
+    /// Rays of the corners, the middles of the sides, and the centre, row by row.
+    ///
+    /// A distorted lens bends the lines between corners: the middle of a side is taken as half as far off the straight
+    /// line as the centre is off the corners' mean.
+    #[inline(always)]
+    pub fn nodes(&self) -> [[f64; 2]; 9] {
+        let [nw, ne, sw, se] = self.corners;
+        let mean = self.mean();
+        let bow = [0.5 * (self.centre[0] - mean.x), 0.5 * (self.centre[1] - mean.y)];
+        let between = |p: [f64; 2], q: [f64; 2]| [0.5 * (p[0] + q[0]) + bow[0], 0.5 * (p[1] + q[1]) + bow[1]];
+        [nw, between(nw, ne), ne, between(nw, sw), self.centre, between(ne, se), sw, between(sw, se), se]
+    }
+
+    /// Two places between the nodes, on the diagonal: their row and column, and their ray.
+    #[inline(always)]
+    pub fn probes(&self, side: usize) -> [(f32, [f64; 2]); 2] {
+        let last = (side - 1) as f32;
+        let towards = |corner: [f64; 2]| [0.5 * (corner[0] + self.centre[0]), 0.5 * (corner[1] + self.centre[1])];
+        [(0.25 * last, towards(self.corners[0])), (0.75 * last, towards(self.corners[3]))]
+    }
+}
+
+fn neighbours(index: &[u32], (column, row): (u32, u32), columns: usize, rows: usize) -> [u32; 8] {
+    const AROUND: [(i64, i64); 8] = [(-1, -1), (0, -1), (1, -1), (-1, 0), (1, 0), (-1, 1), (0, 1), (1, 1)];
+    AROUND.map(|(du, dv)| {
+        let (c, r) = (i64::from(column) + du, i64::from(row) + dv);
+        let inside = c >= 0 && r >= 0 && c < columns as i64 && r < rows as i64;
+        if inside { index[r as usize * columns + c as usize] } else { NONE }
+    })
+}
+
+/// Noise law that explains the patches' own scatter: σ² = a² + b²·d⁴, from medians over depth.
+pub fn noise_from_scatter(samples: &mut [(f64, f64)], floor: f64) -> NoiseLaw {
+    const BINS: usize = 8;
+    samples.sort_by(|a, b| a.0.total_cmp(&b.0));
+    let size = samples.len().div_ceil(BINS).max(1);
+    let (mut n, mut x, mut xx, mut y, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
+    for bin in samples.chunks_mut(size) {
+        let middle = bin.len() / 2;
+        let depth = bin[middle].0;
+        let (_, &mut (_, sigma), _) = bin.select_nth_unstable_by(middle, |a, b| a.1.total_cmp(&b.1));
+        let (d4, s2) = (depth.powi(4), sigma * sigma);
+        n += 1.0;
+        x += d4;
+        xx += d4 * d4;
+        y += s2;
+        xy += d4 * s2;
+    }
+    if n == 0.0 {
+        return NoiseLaw::uniform(floor);
+    }
+    let det: f64 = n * xx - x * x;
+    let slope = if det > 1e-12 * n * xx { ((n * xy - x * y) / det).max(0.0) } else { 0.0 };
+    let constant = ((y - slope * x) / n).max(0.0);
+    let slope = if constant == 0.0 && x > 0.0 { slope.min(y / x) } else { slope };
+    NoiseLaw {
+        floor: floor.max(constant.sqrt()),
+        constant: 0.0,
+        linear: 0.0,
+        quadratic: slope.sqrt(),
+        power_factor: 0.0,
+        power: 1.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_of_small_images_stay_wide_enough_for_a_plane() {
+        let sides = [[80, 4], [160, 4], [224, 6], [320, 8], [512, 8], [640, 8], [1024, 13], [4096, MAX_SIDE]];
+        for [width, side] in sides {
+            assert_eq!(tile_side(width), side, "{width}");
+        }
+    }
+}
