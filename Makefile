@@ -12,7 +12,7 @@ export MPLBACKEND := Agg
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test check lint types rust-test python-test bench docs images dist requirements format clean
+.PHONY: help setup build demo test check lint types rust-test python-test bench golden golden-renew docs images dist requirements format clean
 
 help: ## shows this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -53,6 +53,12 @@ lint: build
 types: build
 	$(BIN)/mypy
 	$(BIN)/python -m mypy.stubtest siloscope._core --allowlist tests/stubtest-allowlist.txt
+
+golden: build ## compares about 400 answers with the ones kept in tests/golden, to the last bit
+	$(BIN)/python tests/golden/golden.py
+
+golden-renew: build ## keeps today's answers: only where a commit changes them on purpose
+	$(BIN)/python tests/golden/golden.py --renew
 
 bench: build ## times every step of locate, a PNG decode beside it
 	$(BIN)/python benchmarks/locate.py
