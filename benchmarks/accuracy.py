@@ -11,7 +11,7 @@ import numpy as np
 from benchmarks import trials
 from benchmarks.trials import DIAMETER, KNOWN, LIDAR_PROFILE, NOTHING, Knowledge
 
-from siloscope.scene import Feed, Scene
+from siloscope.simulation import Feed, Scene
 
 GAUSSIAN = Feed("gaussian", 0.1)
 

@@ -21,11 +21,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-import siloscope.frames
-from siloscope import Camera, Frame, writers
-from siloscope.frames import archive
-from siloscope.paper.scenarios import SILO1
-from siloscope.scene import ASTRA_S
+import siloscope
+from siloscope import Camera, Frame
+from siloscope.io import archive, writers
+from siloscope.simulation import ASTRA_S
+from siloscope.simulation.scenarios import SILO1
 
 UNIT = 0.001
 CAMERA = Camera(640, 480, 570.3, 570.3, 319.5, 239.5)
@@ -55,7 +55,7 @@ def add_png(path: Path, frames: Iterable[Depth]) -> Iterator[int]:
 
 
 def read_source(path: Path) -> Iterator[Depth]:
-    with siloscope.frames.open(path, depth_unit=UNIT) as source:
+    with siloscope.open(path, depth_unit=UNIT) as source:
         for frame in source:
             assert frame.depth is not None
             yield frame.depth

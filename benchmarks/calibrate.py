@@ -24,11 +24,12 @@ from rich.console import Console
 from rich.table import Table
 
 import siloscope
-from siloscope import Estimate, sensors, writers
+from siloscope import Estimate, sensors
 from siloscope.calibrate import SEARCHED
-from siloscope.frames import png
-from siloscope.paper.scenarios import scenario
-from siloscope.scene import ASTRA_S, discharge
+from siloscope.io import writers
+from siloscope.io.images import png
+from siloscope.simulation import ASTRA_S, discharge
+from siloscope.simulation.scenarios import scenario
 
 SENSOR, UNIT = "orbbec-astra-s", 0.001
 HIGHEST = 0.6
@@ -118,7 +119,7 @@ def short_way(folder: Path) -> Table:
     profile = sensors.load(SENSOR)
     alone, led = [], []
     start = None
-    with siloscope.frames.open(folder) as source:
+    with siloscope.open(folder) as source:
         for number, frame in enumerate(source):
             alone.append(siloscope.locate(frame, sensor=profile))
             led.append(siloscope.locate(frame, sensor=profile, start=start, ratios=False))

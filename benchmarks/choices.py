@@ -25,12 +25,13 @@ from benchmarks import trials
 from numpy.typing import NDArray
 
 import siloscope
-from siloscope import SiloPose, steps
+from siloscope import SiloPose
 from siloscope.errors import InputError
-from siloscope.paper.metrics import pc_average_distance
-from siloscope.paper.scenarios import random_scene, scenario
-from siloscope.region import frame_points
-from siloscope.scene import ASTRA_S, PERFECT, Feed, Scene, SimulatedFrame
+from siloscope.estimation import steps
+from siloscope.estimation.region import frame_points
+from siloscope.simulation import ASTRA_S, PERFECT, Feed, Scene, SimulatedFrame
+from siloscope.simulation.metrics import pc_average_distance
+from siloscope.simulation.scenarios import random_scene, scenario
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "design" / "choices-shape-tensor.md"
@@ -274,7 +275,7 @@ def tank() -> NDArray[np.float64]:
 
 def recording(*parts: str) -> Any:
     """The only frame of a file."""
-    with siloscope.frames.open(Path(os.environ["SILOSCOPE_REALDATA"]).joinpath(*parts)) as frames:
+    with siloscope.open(Path(os.environ["SILOSCOPE_REALDATA"]).joinpath(*parts)) as frames:
         return frames[0]
 
 

@@ -2,9 +2,9 @@
 
     python -m benchmarks.content --write
 
-Every silo is `siloscope.paper.scenarios.random_scene` with the Astra S's error. It is calibrated from five frames of an
-earlier discharge; then Gaussian, funnel, mound and tilted feed is measured at 75, 45 and 20 % level. Errors are in % of
-the silo's capacity.
+Every silo is `siloscope.simulation.scenarios.random_scene` with the Astra S's error. It is calibrated from five frames
+of an earlier discharge; then Gaussian, funnel, mound and tilted feed is measured at 75, 45 and 20 % level. Errors are
+in % of the silo's capacity.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from PIL import Image
 
 import siloscope
 from siloscope import sensors
-from siloscope.paper.scenarios import random_scene, scenario
-from siloscope.scene import ASTRA_S, Feed, Scene, SimulatedFrame
 from siloscope.sensors import SensorProfile
+from siloscope.simulation import ASTRA_S, Feed, Scene, SimulatedFrame
+from siloscope.simulation.scenarios import random_scene, scenario
 
 SHAPES = ("gaussian", "funnel", "mound", "tilted")
 LEVELS = (0.75, 0.45, 0.20)

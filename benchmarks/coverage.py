@@ -13,8 +13,8 @@ from benchmarks import trials
 from benchmarks.trials import DIAMETER, KNOWN, NOTHING, Knowledge
 
 from siloscope import Calibration, Estimate
-from siloscope.paper.scenarios import random_scene
-from siloscope.scene import ASTRA_S, Defects, Feed, Scene, defects, discharge
+from siloscope.simulation import ASTRA_S, Defects, Feed, Scene, defects, discharge
+from siloscope.simulation.scenarios import random_scene
 
 SHAPES = ("gaussian", "funnel", "mound", "gaussian+tilted", "rathole+lumpy+tilted")
 QUANTITIES = ("r_x", "r_y", "t_x", "t_y", "radius", "cylinder_bottom", "apex")

@@ -14,9 +14,9 @@ import numpy as np
 from benchmarks import trials
 from benchmarks.trials import KNOWN
 
-from siloscope.paper.bound import cramer_rao
-from siloscope.paper.scenarios import scenario
-from siloscope.scene import ASTRA_S, Feed, SimulatedFrame
+from siloscope.reproduction.bound import cramer_rao
+from siloscope.simulation import ASTRA_S, Feed, SimulatedFrame
+from siloscope.simulation.scenarios import scenario
 
 NAMES = ("silo1", "silo2", "silo3", "silo-r1", "silo-r2")
 LEVELS = (0.0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6)

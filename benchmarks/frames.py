@@ -15,9 +15,9 @@ from PIL import Image
 from rich.console import Console
 from rich.table import Table
 
-import siloscope.frames
-from siloscope import writers
-from siloscope.paper.scenarios import scenario
+import siloscope
+from siloscope.io import writers
+from siloscope.simulation.scenarios import scenario
 
 RUNS = 31
 
@@ -34,7 +34,7 @@ def median_ms(action: Callable[[], object]) -> float:
 
 def read(path: Path) -> object:
     """The frame of a file, through the front door."""
-    with siloscope.frames.open(path, depth_unit=0.001) as source:
+    with siloscope.open(path, depth_unit=0.001) as source:
         return next(iter(source))
 
 

@@ -11,8 +11,8 @@ import numpy as np
 from benchmarks import trials
 from benchmarks.trials import KNOWN
 
-from siloscope.paper.scenarios import random_scene, scenario
-from siloscope.scene import ASTRA_S, Feed, Scene
+from siloscope.simulation import ASTRA_S, Feed, Scene
+from siloscope.simulation.scenarios import random_scene, scenario
 
 NAMES = ("silo1", "silo2", "silo3", "silo-r1", "silo-r2")
 LEVELS = tuple(round(0.1 * step, 1) for step in range(1, 10))

@@ -24,12 +24,12 @@ from rich.console import Console
 from rich.table import Table
 
 import siloscope
-from siloscope import steps
-from siloscope.camera import Camera
-from siloscope.paper.metrics import pc_average_distance
-from siloscope.paper.scenarios import random_scene, scenario
-from siloscope.region import frame_points
-from siloscope.scene import ASTRA_S, Scene, SimulatedFrame
+from siloscope.estimation import steps
+from siloscope.estimation.region import frame_points
+from siloscope.simulation import ASTRA_S, Scene, SimulatedFrame
+from siloscope.simulation.metrics import pc_average_distance
+from siloscope.simulation.scenarios import random_scene, scenario
+from siloscope.types.camera import Camera
 
 SCENARIOS = ("silo1", "silo2", "silo-r1")
 METHODS: tuple[tuple[str, str | None], ...] = (("surface", "orbbec-astra-s"), ("shape-tensor", None))

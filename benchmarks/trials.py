@@ -15,16 +15,15 @@ import numpy as np
 
 import siloscope
 from siloscope import Calibration, Estimate
-from siloscope.paper import metrics
-from siloscope.paper.scenarios import random_big_scene, random_scene, scenario
-from siloscope.scene import ASTRA_S, PERFECT, Feed, Scene, SimulatedFrame
 from siloscope.sensors import SensorProfile
+from siloscope.simulation import ASTRA_S, PERFECT, Feed, Scene, SimulatedFrame, metrics
+from siloscope.simulation.scenarios import random_big_scene, random_scene, scenario
 
 ROOT = Path(__file__).parents[1]
 ACCURACY_PAGE = ROOT / "docs" / "accuracy.md"
 
 LIDAR_PROFILE = SensorProfile("lidar-like", noise=(0.0, 0.01, 0.0, 0.0, 0.0, 2.0))
-"""The profile of `siloscope.paper.scenarios.LIDAR_NOISE`."""
+"""The profile of `siloscope.simulation.scenarios.LIDAR_NOISE`."""
 
 POINT_STRIDE = 101
 """Every so many points of the adjusted cloud are asked for their PC average distance."""

@@ -15,13 +15,13 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import siloscope
-from siloscope import plots
-from siloscope.demo import SENSOR, scenes
-from siloscope.paper.scenarios import scenario
-from siloscope.plots.content import pictures as content_pictures
-from siloscope.results import pictures
-from siloscope.scene import ASTRA_S, Feed
-from siloscope.tracking.page import trend
+from siloscope.reporting import plots
+from siloscope.reporting.demo import SENSOR, scenes
+from siloscope.reporting.plots.content import pictures as content_pictures
+from siloscope.reporting.results import pictures
+from siloscope.reporting.track_page import trend
+from siloscope.simulation import ASTRA_S, Feed
+from siloscope.simulation.scenarios import scenario
 
 IMAGES = Path(__file__).parent / "images"
 SHOWN = ("overview", "profile")

@@ -13,7 +13,7 @@ import sys
 import numpy as np
 
 import siloscope
-from siloscope.region import box_mask
+from siloscope.estimation.region import box_mask
 
 BOX = (0.005, 0.105, 0.03, 0.11, 0.70, 0.80)
 """Where the mug is, metres in the camera frame; its foot and the table are left out."""
@@ -25,7 +25,7 @@ PCL_RADIUS = 0.0387446
 
 def locate(path: str) -> siloscope.Estimate:
     """The mug's axis; its size asks for a fine grid."""
-    with siloscope.frames.open(path) as frames:
+    with siloscope.open(path) as frames:
         frame = frames[0]
     return siloscope.locate(frame, mask=box_mask(frame, BOX), grid=0.003)
 

@@ -13,7 +13,7 @@ import sys
 import numpy as np
 
 import siloscope
-from siloscope.region import label_mask
+from siloscope.estimation.region import label_mask
 
 TABLE_NORMAL = np.array([0.0014, -0.8243, -0.5661])
 INNER_WALL = 43
@@ -21,7 +21,7 @@ INNER_WALL = 43
 
 def locate(path: str) -> siloscope.Estimate:
     """The pot's axis."""
-    with siloscope.frames.open(path) as frames:
+    with siloscope.open(path) as frames:
         frame = frames[0]
     return siloscope.locate(frame, mask=label_mask(frame, INNER_WALL), grid=0.004)
 

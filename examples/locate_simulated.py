@@ -8,9 +8,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import siloscope
-from siloscope.paper.metrics import pc_average_distance, transform_error
-from siloscope.paper.scenarios import scenario
-from siloscope.scene import ASTRA_S
+from siloscope.simulation import ASTRA_S
+from siloscope.simulation.metrics import pc_average_distance, transform_error
+from siloscope.simulation.scenarios import scenario
 
 
 def main() -> None:

@@ -16,7 +16,7 @@ import siloscope
 
 def locate(path: str) -> siloscope.Estimate:
     """The tank's axis. Fifteen metres wide and a thousand points: the grid is coarse."""
-    with siloscope.frames.open(path) as frames:
+    with siloscope.open(path) as frames:
         return siloscope.locate(frames[0], grid=0.2)
 
 

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import siloscope
-from siloscope.paper.scenarios import scenario
-from siloscope.scene import ASTRA_S, Feed
+from siloscope.simulation import ASTRA_S, Feed
+from siloscope.simulation.scenarios import scenario
 
 LEVELS = (0.55, 0.5, 0.45, 0.4, 0.35, 0.3)
 HOUR = 3600.0

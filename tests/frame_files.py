@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-import siloscope.frames
-from siloscope import Camera, Frame, camera_files
+import siloscope
+from siloscope import Camera, Frame
+from siloscope.io import camera_files
 
 HEIGHT, WIDTH = 48, 64
 CAMERA = Camera(WIDTH, HEIGHT, 57.25, 57.5, 31.75, 23.25)
@@ -41,7 +42,7 @@ CLOUD = POINTS[np.isfinite(POINTS).all(axis=2)]
 
 def read(path: Path, **options: object) -> Frame:
     """The only frame of a file."""
-    with siloscope.frames.open(path, **options) as source:  # type: ignore[arg-type]
+    with siloscope.open(path, **options) as source:  # type: ignore[arg-type]
         (frame,) = source
     return frame
 

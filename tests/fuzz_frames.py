@@ -31,8 +31,9 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import frame_files
 import recording_files
-import siloscope.frames
-from siloscope import InputError, camera_files
+import siloscope
+from siloscope import InputError
+from siloscope.io import camera_files
 
 
 def _camera_file(suffix: str) -> Callable[[], bytes]:
@@ -173,7 +174,7 @@ def _read(path: Path) -> None:
     if "camera" in path.name:
         camera_files.read(path)
         return
-    with siloscope.frames.open(path, depth_unit=0.001) as source:
+    with siloscope.open(path, depth_unit=0.001) as source:
         source.describe()
         for frame in islice(source, 100):
             assert (frame.depth is None) != (frame.points is None)

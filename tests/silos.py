@@ -9,9 +9,9 @@ import numpy as np
 
 import siloscope
 from siloscope import sensors
-from siloscope.camera import Camera
-from siloscope.paper.scenarios import looking_at
-from siloscope.scene import ASTRA_S, PERFECT, Feed, Scene, SensorModel, Silo
+from siloscope.simulation import ASTRA_S, PERFECT, Feed, Scene, SensorModel, Silo
+from siloscope.simulation.scenarios import looking_at
+from siloscope.types.camera import Camera
 
 SMALL = Camera(width=320, height=240, fx=285.15, fy=285.15, cx=159.5, cy=119.5)
 """The Astra at half its resolution: quicker to render."""

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 
 import fuzz_frames
-import siloscope.frames
+import siloscope
 from siloscope import Camera, Frame, InputError
 from siloscope.cli import main
-from siloscope.frames import archive
+from siloscope.io import archive
 
 CAMERA = Camera(64, 48, 57.0, 57.0, 31.5, 23.5, "brown_conrady", (0.1, -0.05, 1e-3, -2e-3, 0.01))
 RAW = np.random.default_rng(1).integers(0, 65536, (5, 48, 64), dtype=np.uint16)
@@ -38,7 +38,7 @@ FRAMES = [
 
 
 def read(path: Path) -> list[Frame]:
-    with siloscope.frames.open(path) as source:
+    with siloscope.open(path) as source:
         return list(source)
 
 
@@ -54,7 +54,7 @@ def alike(one: Frame, other: Frame) -> bool:
 def test_what_goes_in_comes_out(tmp_path: Path) -> None:
     path = tmp_path / "many.zarr"
     assert archive.write(path, FRAMES) == 5
-    with siloscope.frames.open(path) as source:
+    with siloscope.open(path) as source:
         frames = list(source)
     assert all(alike(*pair) for pair in zip(FRAMES, frames, strict=True))
     assert source.timestamps == [frame.timestamp for frame in FRAMES]
@@ -131,7 +131,7 @@ def _write_until(path: Path, stop: int, whole: Any, monkeypatch: pytest.MonkeyPa
 _ENDLESS = """
 import sys, itertools, numpy as np
 from siloscope import Frame
-from siloscope.frames import archive
+from siloscope.io import archive
 with archive.Writer(sys.argv[1]) as writer:
     for n in itertools.count():
         writer.append(Frame(depth=np.full((48, 64), n % 65535, np.uint16), depth_unit=0.001, timestamp=float(n)))
@@ -161,7 +161,7 @@ def test_a_damaged_chunk_costs_its_frame_a_missing_one_too(tmp_path: Path) -> No
     data[-100] ^= 1
     chunk.write_bytes(data)
     (path / "depth" / "c.3.0.0").unlink()
-    source = siloscope.frames.open(path)
+    source = siloscope.open(path)
     frames = list(source)
     assert [frame.timestamp for frame in frames] == [FRAMES[n].timestamp for n in (0, 2, 4)]
     assert "fails the checksum" in source.problems[0]
@@ -189,7 +189,7 @@ def test_a_frame_unlike_the_others_is_refused(tmp_path: Path, change: dict[str, 
 def test_another_zarr_folder_is_told_apart(tmp_path: Path) -> None:
     (tmp_path / "zarr.json").write_text('{"zarr_format": 3, "node_type": "group", "attributes": {}}')
     with pytest.raises(InputError, match="no archive of depth frames"):
-        siloscope.frames.open(tmp_path)
+        siloscope.open(tmp_path)
     with pytest.raises(InputError, match="no archive of depth frames"):
         archive.write(tmp_path, FRAMES)
 
@@ -206,7 +206,7 @@ def test_convert_makes_an_archive_and_adds_to_it(tmp_path: Path, capsys: pytest.
     for total in (3, 6):
         assert main(["convert", recording, "-o", str(out), "--json"]) == 0
         assert json.loads(capsys.readouterr().out)["frames"] == 3
-        assert len(siloscope.frames.open(out)) == total
+        assert len(siloscope.open(out)) == total
     assert main(["info", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["depth_unit"] == pytest.approx(0.00025)
 
@@ -227,6 +227,6 @@ def test_a_declared_length_without_its_frames_costs_no_time(tmp_path: Path) -> N
     archive.write(path, FRAMES)
     head = path / "depth" / "zarr.json"
     head.write_text(head.read_text().replace("5,\n", "999999999999,\n", 1))
-    source = siloscope.frames.open(path)
+    source = siloscope.open(path)
     assert len(list(source)) == 5
     assert "999999999994 of 999999999999 frames are missing" in source.problems[0]

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from siloscope import Camera, SiloPose
-from siloscope.paper.bound import ORDER, cramer_rao
-from siloscope.paper.scenarios import scenario
-from siloscope.scene import ASTRA_S, Scene, Silo
+from siloscope.reproduction.bound import ORDER, cramer_rao
+from siloscope.simulation import ASTRA_S, Scene, Silo
+from siloscope.simulation.scenarios import scenario
 
 SMALL = Camera(width=64, height=48, fx=57.03, fy=57.03, cx=31.5, cy=23.5)
 STEP = 1e-6

@@ -15,12 +15,12 @@ import pytest
 
 from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, _core, calibrate, locate, sensors
 from siloscope.cli import main
-from siloscope.fusion import LENGTHS, SCALE, Stack, sums
-from siloscope.paper.discharges import real
-from siloscope.paper.scenarios import random_scene, scenario
-from siloscope.scene import ASTRA_S, Feed, Scene, discharge
-from siloscope.straight import straightened
-from siloscope.surface import PARAMETERS, fit_depth
+from siloscope.estimation.surface import PARAMETERS, fit_depth
+from siloscope.fusion.relinearize import straightened
+from siloscope.fusion.solve import LENGTHS, SCALE, Stack, sums
+from siloscope.reproduction.discharges import real
+from siloscope.simulation import ASTRA_S, Feed, Scene, discharge
+from siloscope.simulation.scenarios import random_scene, scenario
 
 SILO3 = replace(scenario("silo3"), sensor=ASTRA_S)
 
@@ -558,8 +558,8 @@ def test_missing_calibration_files_are_told(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Six frames of a discharge and their camera, as files."""
-    from siloscope import camera_files
-    from siloscope.writers import write_png
+    from siloscope.io import camera_files
+    from siloscope.io.writers import write_png
 
     place = tmp_path_factory.mktemp("frames")
     for number, scene in enumerate(discharge(SILO3, 6, 0.9, 0.1)):

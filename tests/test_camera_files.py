@@ -10,7 +10,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from siloscope import Camera, InputError, camera_files
+from siloscope import Camera, InputError
+from siloscope.io import camera_files
 
 CAMERA = Camera(640, 480, 390.25, 391.5, 321.75, 239.125)
 K = (0.1, -0.05, 1e-3, -2e-5, 0.01)

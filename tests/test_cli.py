@@ -40,7 +40,7 @@ def test_help_loads_no_command() -> None:
     script = (
         "import sys; from siloscope.cli import main; main(['--help']); print([m for m in sys.modules if m in (%s)])"
     )
-    heavy = "'matplotlib', 'PIL', 'siloscope.cli.locate', 'siloscope.plots'"
+    heavy = "'matplotlib', 'PIL', 'siloscope.cli.locate', 'siloscope.reporting.plots'"
     done = subprocess.run([sys.executable, "-c", script % heavy], capture_output=True, text=True)
     assert done.stdout.splitlines()[-1] == "[]"
 

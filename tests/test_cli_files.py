@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 import frame_files as made
-import siloscope.frames
-from siloscope import camera_files
+import siloscope
 from siloscope.cli import main
+from siloscope.io import camera_files
 
 Captured = pytest.CaptureFixture[str]
 
@@ -72,7 +72,7 @@ def test_convert_keeps_values_camera_and_origin(folder: Path, tmp_path: Path, ca
     code, told = document(capsys, "convert", folder, "-o", out)
     assert (code, told["schema"], told["frames"]) == (0, "siloscope.convert/1", 3)
     assert sorted(path.name for path in out.iterdir()) == sorted(Path(name).name for name in told["files"])
-    for frame, before in zip(siloscope.frames.open(out), siloscope.frames.open(folder), strict=True):
+    for frame, before in zip(siloscope.open(out), siloscope.open(folder), strict=True):
         assert np.array_equal(frame.depth, before.depth)
         assert (frame.camera, frame.depth_unit) == (before.camera, before.depth_unit)
     rows = json.loads((out / "frames.json").read_text())["frames"]
@@ -82,7 +82,7 @@ def test_convert_keeps_values_camera_and_origin(folder: Path, tmp_path: Path, ca
 def test_convert_to_one_npz(folder: Path, tmp_path: Path, capsys: Captured) -> None:
     out = tmp_path / "all.npz"
     assert document(capsys, "convert", folder, "-o", out)[0] == 0
-    frames = list(siloscope.frames.open(out))
+    frames = list(siloscope.open(out))
     assert len(frames) == 3
     assert np.array_equal(frames[2].depth, made.RAW + 10)
     assert (frames[0].camera, frames[0].depth_unit) == (made.CAMERA, made.UNIT)
@@ -91,7 +91,7 @@ def test_convert_to_one_npz(folder: Path, tmp_path: Path, capsys: Captured) -> N
 def test_convert_to_a_cloud_back_projects(folder: Path, tmp_path: Path, capsys: Captured) -> None:
     out = tmp_path / "cloud.ply"
     assert main(["convert", str(folder / "depth_1.png"), "-o", str(out)]) == 0
-    (frame,) = siloscope.frames.open(out)
+    (frame,) = siloscope.open(out)
     assert frame.points is not None
     raw = made.RAW + 1
     v, u = np.nonzero((raw > 0) & (raw < 65_535))
@@ -106,7 +106,7 @@ def test_convert_times_and_gravity_come_through(folder: Path, tmp_path: Path, ca
     rows = [{"file": f"depth_{i}.png", "timestamp": 1.7e9 + i, "gravity": [0, 1, 9.7]} for i in (1, 2, 10)]
     (folder / "frames.json").write_text(json.dumps({"frames": rows}))
     assert document(capsys, "convert", folder, "-o", tmp_path / "out")[0] == 0
-    frames = list(siloscope.frames.open(tmp_path / "out"))
+    frames = list(siloscope.open(tmp_path / "out"))
     assert [frame.timestamp for frame in frames] == [1.7e9 + i for i in (1, 2, 10)]
     assert all(np.array_equal(frame.gravity, [0, 1, 9.7]) for frame in frames)
 
@@ -116,18 +116,18 @@ def test_convert_tells_damaged_frames_with_exit_5(folder: Path, tmp_path: Path, 
     damaged.write_bytes(damaged.read_bytes()[:-300])
     code, told = document(capsys, "convert", folder, "-o", tmp_path / "out")
     assert (code, told["frames"], len(told["problems"])) == (5, 2, 1)
-    assert len(list(siloscope.frames.open(tmp_path / "out"))) == 2
+    assert len(list(siloscope.open(tmp_path / "out"))) == 2
 
 
 def test_convert_metres_exactly_or_to_raw_units(tmp_path: Path, capsys: Captured) -> None:
     (tmp_path / "metres.npy").write_bytes(made.MAKERS["metres.npy"]())
     assert document(capsys, "convert", tmp_path / "metres.npy", "-o", tmp_path / "exact")[0] == 0
-    (frame,) = siloscope.frames.open(tmp_path / "exact")
+    (frame,) = siloscope.open(tmp_path / "exact")
     assert np.array_equal(frame.depth, made.METRES)
     camera_files.dump(made.CAMERA, tmp_path / "camera.json")
     arguments = ("convert", tmp_path / "metres.npy", "-o", tmp_path / "raw", "--raw-unit", made.UNIT)
     assert document(capsys, *arguments)[0] == 0
-    (frame,) = siloscope.frames.open(tmp_path / "raw")
+    (frame,) = siloscope.open(tmp_path / "raw")
     assert np.array_equal(frame.depth, made.RAW)
     assert frame.depth_unit == made.UNIT
 
@@ -135,7 +135,7 @@ def test_convert_metres_exactly_or_to_raw_units(tmp_path: Path, capsys: Captured
 def test_convert_clouds_keep_their_labels(tmp_path: Path, capsys: Captured) -> None:
     (tmp_path / "cloud.pcd").write_bytes(made.MAKERS["compressed.pcd"]())
     assert document(capsys, "convert", tmp_path / "cloud.pcd", "-o", tmp_path / "out")[0] == 0
-    (frame,) = siloscope.frames.open(tmp_path / "out")
+    (frame,) = siloscope.open(tmp_path / "out")
     assert np.array_equal(frame.points, made.POINTS, equal_nan=True)
     assert np.array_equal(frame.labels, made.LABELS)
 

@@ -18,10 +18,10 @@ from PIL import Image
 import realdata
 import siloscope
 from siloscope.cli import main
+from siloscope.io.writers import write_camera, write_npy, write_ply, write_png
 from siloscope.locate import METHODS
-from siloscope.paper.scenarios import scenario
+from siloscope.simulation.scenarios import scenario
 from siloscope.wording import printable
-from siloscope.writers import write_camera, write_npy, write_ply, write_png
 
 Shown = pytest.CaptureFixture[str]
 TRUTH = scenario("silo1").pose
@@ -88,7 +88,7 @@ def test_out_has_cloud_document_and_pictures(place: Path, tmp_path: Path, capsys
 
 def test_adjusted_cloud_stands_upright_on_the_axis(place: Path, tmp_path: Path, capsys: Shown) -> None:
     assert main([*arguments(place, "frame.npy"), "--out", str(tmp_path)]) == 0
-    with siloscope.frames.open(tmp_path / "adjusted.ply") as frames:
+    with siloscope.open(tmp_path / "adjusted.ply") as frames:
         points = frames[0].points
     assert points is not None
     wall = points[points[:, 2] < 4.0]

@@ -13,8 +13,8 @@ import pytest
 
 from silos import known, noisy, scene
 from siloscope.cli import main
-from siloscope.scene import Feed
-from siloscope.writers import write_camera, write_npy, write_png
+from siloscope.io.writers import write_camera, write_npy, write_png
+from siloscope.simulation import Feed
 
 Shown = pytest.CaptureFixture[str]
 MADE = noisy(scene(Feed("mound", 0.45)))

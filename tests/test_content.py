@@ -16,8 +16,8 @@ from silos import known, measured, noisy, percent, scene
 from siloscope.content import QUALITY, Datasheet
 from siloscope.content.knowledge import know
 from siloscope.errors import InputError, UsageError
-from siloscope.paper.scenarios import random_scene
-from siloscope.scene import ASTRA_S, PERFECT, Defects, Feed, Silo, defects
+from siloscope.simulation import ASTRA_S, PERFECT, Defects, Feed, Silo, defects
+from siloscope.simulation.scenarios import random_scene
 
 PLACES = [(0.0, 0.0), (0.4, 0.2), (-0.8, 0.3), (0.2, -0.9)]
 

@@ -15,7 +15,7 @@ from silos import STOUT, known, measured, scene
 from siloscope.content import Datasheet, Density, Strapping, products
 from siloscope.content.density import GRAVITY, choose, load
 from siloscope.errors import InputError, UsageError
-from siloscope.scene import Feed, Silo
+from siloscope.simulation import Feed, Silo
 
 
 class TestDensity:
@@ -186,7 +186,7 @@ class TestBareClouds:
             siloscope.volume_between(siloscope.surface_map(self.heap()), siloscope.surface_map(self.heap(), (0, 1, 1)))
 
     def cloud(self, name: str) -> np.ndarray:
-        with siloscope.frames.open(realdata.path("bin_content_livox", name)) as source:
+        with siloscope.open(realdata.path("bin_content_livox", name)) as source:
             points = np.asarray(source[0].points, float).reshape(-1, 3)
         return points[np.isfinite(points).all(axis=1) & (np.abs(points).sum(axis=1) > 0.0)]
 

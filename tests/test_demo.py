@@ -11,7 +11,7 @@ import pytest
 
 from siloscope import Calibration
 from siloscope.cli import main
-from siloscope.demo import METHODS, SCENE, scenes
+from siloscope.reporting.demo import METHODS, SCENE, scenes
 
 
 @pytest.fixture(scope="module")

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 import siloscope
-from siloscope import documents
-from siloscope.paper.scenarios import scenario
-from siloscope.results import write_results
+from siloscope.reporting.results import write_results
+from siloscope.schema import documents
+from siloscope.simulation.scenarios import scenario
 
 
 def strict(text: str) -> object:

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 
 import frame_files as made
-import siloscope.frames
+import siloscope
 from frame_files import put, read
-from siloscope import Camera, InputError, camera_files, writers
+from siloscope import Camera, InputError
+from siloscope.io import camera_files, writers
 
 
 @pytest.mark.parametrize("order", ["C", "F"])
@@ -22,7 +23,7 @@ def test_arrays_of_every_order_and_type(tmp_path: Path, order: str, dtype: str) 
     values = made.RAW // 16 if dtype.endswith("f2") else made.RAW
     stack = np.asarray([values, values + 1], order=order).astype(dtype)
     path = put(tmp_path, made.npy(stack))
-    with siloscope.frames.open(path, depth_unit=0.001) as source:
+    with siloscope.open(path, depth_unit=0.001) as source:
         first, second = source
     expected = values if stack.dtype.kind in "ui" else values * 0.001
     assert np.allclose(first.depth, expected, rtol=1e-3 if dtype.endswith("f2") else 1e-6)
@@ -51,7 +52,7 @@ def test_npz_carries_what_belongs_to_the_frames(tmp_path: Path) -> None:
         path, np.stack([made.RAW] * 2), camera=made.CAMERA, depth_unit=made.UNIT, timestamps=[5.0, 6.5],
         gravity=gravity, labels=np.stack([made.LABELS, made.LABELS + 1]),
     )  # fmt: skip
-    with siloscope.frames.open(path) as source:
+    with siloscope.open(path) as source:
         frames = list(source)
     assert [frame.timestamp for frame in frames] == [5.0, 6.5]
     assert all(frame.camera == made.CAMERA and frame.depth_unit == made.UNIT for frame in frames)
@@ -96,7 +97,7 @@ def test_organised_points_recover_their_camera(tmp_path: Path) -> None:
 def test_labels_for_all_frames_or_for_each(tmp_path: Path) -> None:
     stack = np.stack([made.METRES] * 2)
     for labels in (made.LABELS, np.stack([made.LABELS] * 2)):
-        frames = list(siloscope.frames.open(put(tmp_path, made.npz(depth=stack, labels=labels))))
+        frames = list(siloscope.open(put(tmp_path, made.npz(depth=stack, labels=labels))))
         assert all(np.array_equal(frame.labels, made.LABELS) for frame in frames)
     cloud = made.npz(points=made.CLOUD, labels=np.arange(len(made.CLOUD)))
     assert read(put(tmp_path, cloud)).labels.tolist() == list(range(len(made.CLOUD)))  # type: ignore[union-attr]
@@ -105,7 +106,7 @@ def test_labels_for_all_frames_or_for_each(tmp_path: Path) -> None:
 def test_a_stack_that_was_cut_off_gives_the_frames_before(tmp_path: Path) -> None:
     content = made.npy(np.stack([made.RAW] * 3))
     path = put(tmp_path, content[: -made.RAW.nbytes // 2], "cut.npy")
-    with siloscope.frames.open(path, depth_unit=0.001) as source:
+    with siloscope.open(path, depth_unit=0.001) as source:
         assert len(list(source)) == 2
         assert source.problems == [f"{path}: cut off after 2 of 3 frames; save it again"]
 
@@ -166,7 +167,7 @@ BAD_ARRAYS = {
 @pytest.mark.parametrize(("content", "cause"), BAD_ARRAYS.values(), ids=BAD_ARRAYS.keys())
 def test_bad_arrays_are_refused(tmp_path: Path, content: bytes, cause: str) -> None:
     with pytest.raises(InputError, match=rf"bad\.np.*({cause})"):
-        list(siloscope.frames.open(put(tmp_path, content, "bad.np")))
+        list(siloscope.open(put(tmp_path, content, "bad.np")))
 
 
 def test_a_stream_names_the_array(tmp_path: Path) -> None:

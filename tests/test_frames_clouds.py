@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 import frame_files as made
 from frame_files import put, read
 from siloscope import Camera, InputError, _core
-from siloscope.frames.clouds import recover_camera
+from siloscope.io.clouds.columns import recover_camera
 
 
 def ply(*lines: str, body: bytes = b"") -> bytes:

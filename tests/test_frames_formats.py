@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 import frame_files as made
-import siloscope.frames
+import siloscope
 from frame_files import put, read
 
 
 @pytest.mark.parametrize("name", made.MAKERS)
 def test_every_format_opens_by_its_content_alone(tmp_path: Path, name: str) -> None:
     path = put(tmp_path, made.MAKERS[name](), "renamed.dat")
-    with siloscope.frames.open(path, depth_unit=None if "metres" in name or "lzw" in name else made.UNIT) as source:
+    with siloscope.open(path, depth_unit=None if "metres" in name or "lzw" in name else made.UNIT) as source:
         described = source.describe()
         frames = list(source)
     assert described["frames"] == len(frames)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from PIL import Image
 
 import frame_files as made
-import siloscope.frames
+import siloscope
 from frame_files import put, read
 from siloscope import InputError, _core
 
@@ -107,7 +107,7 @@ def test_bad_png_is_refused(tmp_path: Path, content: bytes, cause: str) -> None:
 def test_tiff_of_every_compression(tmp_path: Path, compression: str | None, dtype: type) -> None:
     values = made.METRES if dtype is np.float32 else made.RAW.astype(dtype)
     path = put(tmp_path, made.tiff(values, compression, pages=2))
-    with siloscope.frames.open(path, depth_unit=None if dtype is np.float32 else 0.001) as source:
+    with siloscope.open(path, depth_unit=None if dtype is np.float32 else 0.001) as source:
         frames = list(source)
     assert len(frames) == 2
     assert all(np.array_equal(frame.depth, values) for frame in frames)
@@ -143,4 +143,4 @@ BAD_TIFF = {
 @pytest.mark.parametrize(("content", "cause"), BAD_TIFF.values(), ids=BAD_TIFF.keys())
 def test_bad_tiff_is_refused(tmp_path: Path, content: bytes, cause: str) -> None:
     with pytest.raises(InputError, match=rf"bad\.tif: .*({cause})"):
-        list(siloscope.frames.open(put(tmp_path, content, "bad.tif"), depth_unit=0.001))
+        list(siloscope.open(put(tmp_path, content, "bad.tif"), depth_unit=0.001))

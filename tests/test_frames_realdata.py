@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 import realdata
-import siloscope.frames
+import siloscope
 from siloscope import Frame
 
 
 def only_frame(*parts: str) -> Frame:
-    with siloscope.frames.open(realdata.path(*parts)) as source:
+    with siloscope.open(realdata.path(*parts)) as source:
         (frame,) = source
         assert not source.problems
     return frame

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import siloscope.frames
-from siloscope import Camera, InputError, UsageError, writers
+import siloscope
+from siloscope import Camera, InputError, UsageError
+from siloscope.io import writers
 
 RAW = np.random.default_rng(1).integers(400, 6000, (48, 64), dtype=np.uint16)
 CAMERA = Camera(64, 48, 57.0, 57.0, 31.5, 23.5)
@@ -27,7 +28,7 @@ def png(tmp_path: Path) -> Path:
 
 
 def test_a_png_gives_its_raw_units(png: Path) -> None:
-    with siloscope.frames.open(png, camera=CAMERA, depth_unit=0.00025) as source:
+    with siloscope.open(png, camera=CAMERA, depth_unit=0.00025) as source:
         (frame,) = source
     assert frame.depth is not None
     assert frame.depth.dtype == np.uint16
@@ -38,25 +39,25 @@ def test_a_png_gives_its_raw_units(png: Path) -> None:
 
 def test_a_missing_unit_is_asked_for(png: Path) -> None:
     with pytest.raises(InputError, match="--depth-unit"):
-        list(siloscope.frames.open(png))
+        list(siloscope.open(png))
 
 
 def test_a_camera_of_another_size_is_refused(png: Path) -> None:
     other = Camera(640, 480, 570.0, 570.0, 319.5, 239.5)
     with pytest.raises(InputError, match="64 x 48 pixels but the camera 640 x 480"):
-        list(siloscope.frames.open(png, camera=other, depth_unit=0.001))
+        list(siloscope.open(png, camera=other, depth_unit=0.001))
 
 
 def test_content_decides_not_the_name(png: Path) -> None:
     renamed = png.rename(png.with_suffix(".npy"))
-    assert siloscope.frames.sniff(renamed).name == "png"
+    assert siloscope.io.sniff(renamed).name == "png"
 
 
 def test_one_damaged_file_of_several_is_told_and_skipped(png: Path) -> None:
     cut = png.with_name("cut.png")
     cut.write_bytes(png.read_bytes()[:-400])
     missing = png.with_name("missing.png")
-    source = siloscope.frames.open([png, cut, missing, png], depth_unit=0.001)
+    source = siloscope.open([png, cut, missing, png], depth_unit=0.001)
     assert len(source) == 4
     frames = list(source)
     assert len(frames) == 2
@@ -71,7 +72,7 @@ def test_frames_decoded_ahead_are_the_same_in_the_same_order(tmp_path: Path, cou
         Image.fromarray(RAW + np.uint16(number)).save(tmp_path / f"{number:02}.png")
     whole = (tmp_path / "17.png").read_bytes()
     (tmp_path / "17.png").write_bytes(whole[:-400])
-    with siloscope.frames.open(tmp_path, depth_unit=0.001) as source, ThreadPoolExecutor(3) as pool:
+    with siloscope.open(tmp_path, depth_unit=0.001) as source, ThreadPoolExecutor(3) as pool:
         alone, problems = list(source), source.problems
         ahead = source.ahead(pool, count)
         assert len(ahead) == len(source) == 40
@@ -98,7 +99,7 @@ class FirstOnly(Executor):
 
 def test_frames_decoded_ahead_can_be_left_in_the_middle(png: Path) -> None:
     pool = FirstOnly()
-    frames = iter(siloscope.frames.open([png] * 30, depth_unit=0.001).ahead(pool, 20))
+    frames = iter(siloscope.open([png] * 30, depth_unit=0.001).ahead(pool, 20))
     assert np.array_equal(next(frames).depth, RAW)
     frames.close()
     assert [future.cancelled() for future in pool.given] == [False] + [True] * 20
@@ -106,36 +107,36 @@ def test_frames_decoded_ahead_can_be_left_in_the_middle(png: Path) -> None:
 
 def test_a_missing_unit_is_asked_for_by_frames_decoded_ahead_too(png: Path) -> None:
     with ThreadPoolExecutor(2) as pool, pytest.raises(InputError, match="--depth-unit"):
-        list(siloscope.frames.open([png] * 3).ahead(pool, 4))
+        list(siloscope.open([png] * 3).ahead(pool, 4))
 
 
 def test_nothing_readable_is_an_error(png: Path) -> None:
     png.write_bytes(png.read_bytes()[:-400])
     with pytest.raises(InputError, match=r"depth\.png: damaged PNG"):
-        list(siloscope.frames.open(png, depth_unit=0.001))
+        list(siloscope.open(png, depth_unit=0.001))
 
 
 def test_a_stream_that_is_not_there_is_wrong_usage(png: Path) -> None:
-    assert len(siloscope.frames.open(png, stream="depth")) == 1
+    assert len(siloscope.open(png, stream="depth")) == 1
     with pytest.raises(UsageError, match="has the stream 'depth', none named 'colour'"):
-        siloscope.frames.open(png, stream="colour")
+        siloscope.open(png, stream="colour")
 
 
 @pytest.mark.parametrize("unit", [0.0, -1.0, float("nan"), float("inf"), 1000.0])
 def test_impossible_units_are_refused(png: Path, unit: float) -> None:
     with pytest.raises(UsageError, match="depth unit"):
-        siloscope.frames.open(png, depth_unit=unit)
+        siloscope.open(png, depth_unit=unit)
 
 
 def test_a_file_that_vanishes_after_opening_is_an_input_error(png: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    source = siloscope.frames.open(png, depth_unit=0.001)
+    source = siloscope.open(png, depth_unit=0.001)
     png.unlink()
     with pytest.raises(InputError, match=r"depth\.png: can't be read"):
         list(source)
 
 
 def test_frames_can_be_taken_by_number(png: Path) -> None:
-    source = siloscope.frames.open([png, png], depth_unit=0.001)
+    source = siloscope.open([png, png], depth_unit=0.001)
     assert source.frame_count == 2
     assert np.array_equal(source[1].depth, RAW)
     for index in (2, -1):
@@ -146,35 +147,35 @@ def test_frames_can_be_taken_by_number(png: Path) -> None:
 def test_special_files_and_bad_paths_are_refused(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     with pytest.raises(InputError, match="not a file or folder"):
-        siloscope.frames.open(tmp_path / "pipe")
+        siloscope.open(tmp_path / "pipe")
     (tmp_path / "empty.png").touch()
     with pytest.raises(InputError, match="the file is empty"):
-        siloscope.frames.open(tmp_path / "empty.png")
+        siloscope.open(tmp_path / "empty.png")
     for bad in ("missing\0name", "x" * 5000):
         with pytest.raises(InputError):
-            siloscope.frames.open(tmp_path / bad)
+            siloscope.open(tmp_path / bad)
     with pytest.raises(UsageError):
-        siloscope.frames.open([])
+        siloscope.open([])
 
 
 def test_unknown_content_is_named(tmp_path: Path) -> None:
     path = tmp_path / "depth.png"
     path.write_bytes(b"\x00\x01\x02 nothing known")
     with pytest.raises(InputError, match=r"depth\.png: content starting with .* png"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
 
 
 def test_float_depth_that_looks_like_millimetres_is_not_taken_for_metres(tmp_path: Path) -> None:
     np.save(tmp_path / "mm.npy", RAW.astype(np.float32))
     with pytest.raises(InputError, match=r"0\.001 for millimetres"):
-        list(siloscope.frames.open(tmp_path / "mm.npy"))
-    (frame,) = siloscope.frames.open(tmp_path / "mm.npy", depth_unit=0.001)
+        list(siloscope.open(tmp_path / "mm.npy"))
+    (frame,) = siloscope.open(tmp_path / "mm.npy", depth_unit=0.001)
     assert np.allclose(frame.depth, RAW * 0.001)
 
 
 def test_a_unit_that_puts_the_wall_at_kilometres_is_refused(png: Path) -> None:
     with pytest.raises(InputError, match="puts the median depth at"):
-        list(siloscope.frames.open(png, depth_unit=1))
+        list(siloscope.open(png, depth_unit=1))
 
 
 @pytest.mark.parametrize("name", ["mm.npy", "mm.ply", "mm.xyz"])
@@ -188,22 +189,22 @@ def test_points_in_millimetres_are_not_taken_for_metres(tmp_path: Path, name: st
     else:
         np.savetxt(path, points)
     with pytest.raises(InputError, match=r"0\.001 for millimetres"):
-        list(siloscope.frames.open(path))
-    (frame,) = siloscope.frames.open(path, depth_unit=0.001)
+        list(siloscope.open(path))
+    (frame,) = siloscope.open(path, depth_unit=0.001)
     assert np.allclose(frame.points, points * 0.001)
-    (frame,) = siloscope.frames.open(path, depth_unit=1)
+    (frame,) = siloscope.open(path, depth_unit=1)
     assert np.allclose(frame.points, points)
 
 
 def test_a_unit_does_not_shrink_what_is_metres_already(tmp_path: Path) -> None:
     metres = (RAW * 0.001).astype(np.float32)
     np.save(tmp_path / "metres.npy", metres)
-    (frame,) = siloscope.frames.open(tmp_path / "metres.npy", depth_unit=0.001)
+    (frame,) = siloscope.open(tmp_path / "metres.npy", depth_unit=0.001)
     assert np.array_equal(frame.depth, metres)
     assert frame.provenance["depth_unit_from"] == "not applied: floating point is metres"
     points = np.random.default_rng(2).uniform(-1.5, 1.5, (500, 3))
     writers.write_ply(tmp_path / "metres.ply", points)
-    (frame,) = siloscope.frames.open(tmp_path / "metres.ply", depth_unit=0.001)
+    (frame,) = siloscope.open(tmp_path / "metres.ply", depth_unit=0.001)
     assert np.array_equal(frame.points, points)
 
 
@@ -211,5 +212,5 @@ def test_ray_length_becomes_z(tmp_path: Path) -> None:
     z = np.full((48, 64), 2.0)
     length = z * np.sqrt(1 + np.sum(CAMERA.rays() ** 2, axis=2))
     np.save(tmp_path / "length.npy", length)
-    (frame,) = siloscope.frames.open(tmp_path / "length.npy", camera=CAMERA, ray_length=True)
+    (frame,) = siloscope.open(tmp_path / "length.npy", camera=CAMERA, ray_length=True)
     assert np.allclose(frame.depth, z, rtol=0, atol=1e-12)

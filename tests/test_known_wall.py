@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from siloscope import Calibration, Estimate, Frame, calibrate, locate
-from siloscope.paper.scenarios import scenario
-from siloscope.pose import SiloPose
-from siloscope.scene import ASTRA_S, Defects, Feed, Scene, discharge
+from siloscope.simulation import ASTRA_S, Defects, Feed, Scene, discharge
+from siloscope.simulation.scenarios import scenario
+from siloscope.types.pose import SiloPose
 
 PROFILE = "orbbec-astra-s"
 FEEDS = ("gaussian", "funnel", "funnel+tilted+lumpy+rathole")

@@ -19,11 +19,11 @@ import pytest
 from data import make_realsense as made
 from siloscope import Camera, Estimate, Frame, InputError, SiloPose, UsageError
 from siloscope.cli import main
-from siloscope.live import SensorProcess, sensor, turn_for_more_wall
-from siloscope.paper.scenarios import SILO3
-from siloscope.scene import Feed
-from siloscope.sensor_realsense import RealSense
-from siloscope.writers import write_camera, write_png
+from siloscope.io.writers import write_camera, write_png
+from siloscope.sensors.live import SensorProcess, sensor, turn_for_more_wall
+from siloscope.sensors.live.realsense import RealSense
+from siloscope.simulation import Feed
+from siloscope.simulation.scenarios import SILO3
 
 DATA = Path(__file__).parent / "data"
 

@@ -13,7 +13,7 @@ from hypothesis.extra import numpy as hnp
 
 import siloscope
 from siloscope import Camera, Frame, InputError, SiloscopeError, UsageError
-from siloscope.paper.scenarios import scenario
+from siloscope.simulation.scenarios import scenario
 
 SCENE = scenario("silo1")
 CAMERA = replace(SCENE.camera, width=160, height=120, fx=142.6, fy=142.6, cx=79.5, cy=59.5)

@@ -10,7 +10,8 @@ import pytest
 from scipy.spatial import cKDTree
 
 from siloscope import Camera, SiloPose, UsageError, _core
-from siloscope.paper.metrics import (
+from siloscope.simulation import Scene, Silo
+from siloscope.simulation.metrics import (
     area_ratios,
     camera_points,
     cloud_distance,
@@ -19,8 +20,7 @@ from siloscope.paper.metrics import (
     pixel_ratios,
     transform_error,
 )
-from siloscope.paper.scenarios import SILO1, SILO2, SILO3
-from siloscope.scene import Scene, Silo
+from siloscope.simulation.scenarios import SILO1, SILO2, SILO3
 
 SMALL = Camera(width=96, height=72, fx=85.5, fy=85.5, cx=47.5, cy=35.5)
 

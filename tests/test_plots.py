@@ -10,12 +10,13 @@ import pytest
 from matplotlib.figure import Figure
 from PIL import Image
 
-from siloscope import SiloGeometry, plots
-from siloscope.paper.metrics import LABELS, camera_points
-from siloscope.paper.scenarios import scenario
-from siloscope.plots.directions import angles
-from siloscope.plots.profile import wall_distance
-from siloscope.scene import SimulatedFrame
+from siloscope import SiloGeometry
+from siloscope.reporting import plots
+from siloscope.reporting.plots.directions import angles
+from siloscope.reporting.plots.profile import wall_distance
+from siloscope.simulation import SimulatedFrame
+from siloscope.simulation.metrics import LABELS, camera_points
+from siloscope.simulation.scenarios import scenario
 
 
 @pytest.fixture(scope="module")

@@ -12,7 +12,7 @@ import pytest
 
 from siloscope import sensors
 from siloscope.cli import main
-from siloscope.demo import SCENE, write_frame
+from siloscope.reporting.demo import SCENE, write_frame
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text("utf-8")

@@ -13,17 +13,17 @@ import pytest
 
 import realdata
 import recording_files
-import siloscope.frames
+import siloscope
 from siloscope import Camera, Frame, InputError
 from siloscope.cli import main
-from siloscope.frames import e57
+from siloscope.io.clouds import e57
 
 CLOUDS = "formats_las_e57"
 MUG = ("azure_kinect_mkv_mug", "recording.mkv")
 
 
 def only_frame(path: Path, **options: Any) -> Frame:
-    with siloscope.frames.open(path, **options) as source:
+    with siloscope.open(path, **options) as source:
         (frame,) = source
     return frame
 
@@ -75,7 +75,7 @@ def test_a_cut_las_file_is_refused(tmp_path: Path, name: str, share: float) -> N
     cut = tmp_path / name
     cut.write_bytes(whole[: int(len(whole) * share)])
     with pytest.raises(InputError, match=r"cut off|damaged"):
-        list(siloscope.frames.open(cut))
+        list(siloscope.open(cut))
 
 
 def test_a_missing_library_names_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -83,7 +83,7 @@ def test_a_missing_library_names_its_extra(tmp_path: Path, monkeypatch: pytest.M
     path = tmp_path / "cloud.laz"
     path.write_bytes(recording_files.las(compressed=True))
     with pytest.raises(InputError, match=r"extra 'las': pip install 'siloscope\[las\]'"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
 
 
 @pytest.mark.parametrize("version", ["1.2", "1.4"])
@@ -162,7 +162,7 @@ def test_a_description_without_a_count_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "cloud.e57"
     path.write_bytes(recording_files.with_checksums(recording_files.e57().replace(b"recordCount", b"recordCxxxx")))
     with pytest.raises(InputError, match=r"cloud\.e57: damaged description \('recordCount'\)"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
 
 
 def test_a_negative_count_is_refused(tmp_path: Path) -> None:
@@ -170,12 +170,12 @@ def test_a_negative_count_is_refused(tmp_path: Path) -> None:
     negative = recording_files.e57().replace(b'recordCount="30"', b'recordCount="-3"')
     path.write_bytes(recording_files.with_checksums(negative))
     with pytest.raises(InputError, match="scan 0 has -3 points"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
 
 
 def test_a_wrong_checksum_is_refused_with_its_page() -> None:
     with pytest.raises(InputError, match="page 33 fails its checksum"):
-        siloscope.frames.open(realdata.path(CLOUDS, "corrupt_crc.e57"))
+        siloscope.open(realdata.path(CLOUDS, "corrupt_crc.e57"))
 
 
 def test_a_flipped_bit_among_the_points_is_refused(tmp_path: Path) -> None:
@@ -184,7 +184,7 @@ def test_a_flipped_bit_among_the_points_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "flipped.e57"
     path.write_bytes(data)
     with pytest.raises(InputError, match="page 195 fails its checksum"):
-        list(siloscope.frames.open(path))
+        list(siloscope.open(path))
 
 
 # --- EXR
@@ -249,7 +249,7 @@ def test_exr_without_a_channel_that_is_depth_asks(tmp_path: Path) -> None:
     path = tmp_path / "colour.exr"
     exr.File({}, {name: np.full((48, 64), i, np.float32) for i, name in enumerate("RGB", 1)}).write(str(path))
     with pytest.raises(InputError, match="which channel is depth"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
     depth = only_frame(path, stream="G").depth
     assert depth is not None
     assert depth[0, 0] == 2
@@ -261,7 +261,7 @@ def test_exr_without_a_channel_that_is_depth_asks(tmp_path: Path) -> None:
 def test_azure_kinect_recording() -> None:
     """Reference values of the recording's README; the camera by k4a's formula from calibration.json."""
     path = realdata.path(*MUG)
-    with siloscope.frames.open(path) as source:
+    with siloscope.open(path) as source:
         (frame,) = source
     depth, camera = frame.depth, frame.camera
     assert depth is not None
@@ -302,9 +302,9 @@ def test_a_cut_azure_kinect_recording(tmp_path: Path, share: float) -> None:
     path.write_bytes(whole[: int(len(whole) * share)])
     if share < 0.57:
         with pytest.raises(InputError, match="cut off"):
-            list(siloscope.frames.open(path))
+            list(siloscope.open(path))
     else:
-        source = siloscope.frames.open(path)
+        source = siloscope.open(path)
         assert len(list(source)) == 1
         assert "cut off" in source.problems[0]
 
@@ -314,7 +314,7 @@ def test_a_film_is_no_depth_recording(tmp_path: Path) -> None:
     whole = realdata.path(*MUG).read_bytes()
     path.write_bytes(whole.replace(b"DEPTH", b"RIGHT", 1))
     with pytest.raises(InputError, match="the tracks are: COLOR, RIGHT, IR, IMU"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
 
 
 def test_an_e57_packet_too_short_for_its_head_is_damage() -> None:

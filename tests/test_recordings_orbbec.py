@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import bags
-import siloscope.frames
+import siloscope
 from siloscope import Camera, InputError
 
 RAWS = list(np.random.default_rng(6).integers(0, 65536, (3, 48, 64), dtype=np.uint16))
@@ -19,7 +19,7 @@ K1_TO_P2 = (0.1, -0.02, 0.003, 0.4, 0.05, 0.006, 1e-3, 2e-3)
 
 @pytest.mark.parametrize("tail", [{"unit": None}, {"unit": 0.0, "bit_size": False}, {"unit": 0.0}])
 def test_depth_and_camera_whatever_follows_the_image(tmp_path: Path, tail: dict[str, Any]) -> None:
-    with siloscope.frames.open(bags.orbbec(tmp_path / "o.bag", RAWS, **tail)) as source:
+    with siloscope.open(bags.orbbec(tmp_path / "o.bag", RAWS, **tail)) as source:
         frames = list(source)
     assert np.array_equal([frame.depth for frame in frames], RAWS)
     camera = source.camera
@@ -44,13 +44,13 @@ def test_depth_and_camera_whatever_follows_the_image(tmp_path: Path, tail: dict[
 def test_the_unit_is_the_images_else_the_propertys_else_a_millimetre(
     tmp_path: Path, options: dict[str, Any], unit: float, origin: str
 ) -> None:
-    frame = next(iter(siloscope.frames.open(bags.orbbec(tmp_path / "o.bag", RAWS, **options))))
+    frame = next(iter(siloscope.open(bags.orbbec(tmp_path / "o.bag", RAWS, **options))))
     assert frame.depth_unit == pytest.approx(unit, rel=1e-6)
     assert frame.provenance["depth_unit_from"].startswith(origin)
 
 
 def test_time_is_the_computers_where_recorded(tmp_path: Path) -> None:
-    source = siloscope.frames.open(bags.orbbec(tmp_path / "o.bag", RAWS, unit=0.0))
+    source = siloscope.open(bags.orbbec(tmp_path / "o.bag", RAWS, unit=0.0))
     assert source.timestamps == pytest.approx([1.7e9, 1.7e9 + 0.033, 1.7e9 + 0.066], abs=1e-5)
 
 
@@ -63,7 +63,7 @@ def test_time_is_the_computers_where_recorded(tmp_path: Path) -> None:
 )
 def test_distortion_is_in_the_sdks_order(tmp_path: Path, number: int, model: str, d: tuple[float, ...]) -> None:
     k = K1_TO_P2 if model == "rational" else (*K1_TO_P2[:3], 0.0, 0.0, 0.0, *K1_TO_P2[6:])
-    camera = siloscope.frames.open(bags.orbbec(tmp_path / "o.bag", RAWS, distortion=k, model=number)).camera
+    camera = siloscope.open(bags.orbbec(tmp_path / "o.bag", RAWS, distortion=k, model=number)).camera
     assert camera is not None
     assert camera.distortion_model == model
     assert camera.distortion == pytest.approx(d, rel=1e-6)
@@ -72,24 +72,24 @@ def test_distortion_is_in_the_sdks_order(tmp_path: Path, number: int, model: str
 def test_gravity_goes_through_the_accelerometers_extrinsics(tmp_path: Path) -> None:
     """The fixture's rotation takes x, y, z of the accelerometer to y, z, x of the camera."""
     path = bags.orbbec(tmp_path / "o.bag", RAWS, accel=np.array([-9.8, 0.1, 0.2]))
-    np.testing.assert_allclose(siloscope.frames.open(path).gravity, [-0.2, 9.8, -0.1], atol=1e-6)
+    np.testing.assert_allclose(siloscope.open(path).gravity, [-0.2, 9.8, -0.1], atol=1e-6)
 
 
 @pytest.mark.parametrize("fx", [0.0, float("nan")])
 def test_nan_and_zero_intrinsics_are_refused_by_name_but_the_users_win(tmp_path: Path, fx: float) -> None:
     path = bags.orbbec(tmp_path / "o.bag", RAWS, fx=fx)
     with pytest.raises(InputError, match=r"stream profile: .*--camera"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
     camera = Camera(64, 48, 57.0, 57.0, 31.5, 23.5)
-    assert next(iter(siloscope.frames.open(path, camera=camera))).camera == camera
+    assert next(iter(siloscope.open(path, camera=camera))).camera == camera
 
 
 def test_an_encoding_that_is_not_read_is_named(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="'RVL', which is not read; record with format Y16"):
-        list(siloscope.frames.open(bags.orbbec(tmp_path / "o.bag", RAWS, encoding="RVL")))
+        list(siloscope.open(bags.orbbec(tmp_path / "o.bag", RAWS, encoding="RVL")))
 
 
 def test_sdk_version_1_calls_its_camera_cam0(tmp_path: Path) -> None:
-    source = siloscope.frames.open(bags.orbbec(tmp_path / "o.bag", RAWS, camera="cam0", unit=0.001))
+    source = siloscope.open(bags.orbbec(tmp_path / "o.bag", RAWS, camera="cam0", unit=0.001))
     assert source.provenance["stream"] == "cam0/depth"
     assert np.array_equal(next(iter(source)).depth, RAWS[0])

@@ -14,13 +14,13 @@ import numpy as np
 import pytest
 
 import realdata
-import siloscope.frames
+import siloscope
 from bags import Maker
 from data import make_realsense as made
 from siloscope import Camera, InputError, UsageError
 from siloscope.cli import main
-from siloscope.frames import realsense
-from siloscope.frames.rosbag1 import Rosbag1
+from siloscope.io.recordings.containers.rosbag1 import Rosbag1
+from siloscope.io.recordings.vendors import realsense
 
 DATA = Path(__file__).parent / "data"
 FIXTURES = [DATA / "realsense.bag", DATA / "realsense.db3"]
@@ -36,7 +36,7 @@ def sdk() -> Any:
 
 @pytest.mark.parametrize("path", FIXTURES, ids=["bag", "db3"])
 def test_depth_unit_and_camera_are_those_recorded(path: Path) -> None:
-    with siloscope.frames.open(path) as source:
+    with siloscope.open(path) as source:
         frames = list(source)
     assert np.array_equal([frame.depth for frame in frames], made.depth_frames())
     assert [np.float32(frame.depth_unit) for frame in frames] == [np.float32(made.UNIT)] * 3
@@ -46,7 +46,7 @@ def test_depth_unit_and_camera_are_those_recorded(path: Path) -> None:
 
 @pytest.mark.parametrize("path", FIXTURES, ids=["bag", "db3"])
 def test_gravity_points_against_the_accelerometer(path: Path) -> None:
-    frame = next(iter(siloscope.frames.open(path)))
+    frame = next(iter(siloscope.open(path)))
     assert frame.gravity is not None
     np.testing.assert_allclose(frame.gravity, -np.array(made.ACCELERATION), rtol=1e-6)
 
@@ -61,7 +61,7 @@ def test_bit_for_bit_what_the_sdk_plays(tmp_path: Path, suffix: str, compressed:
     by_the_sdk("play", str(path), str(tmp_path / "played.npz"))
     with np.load(tmp_path / "played.npz") as played:
         units, depth = played["units"], played["depth"]
-    frames = list(siloscope.frames.open(path))
+    frames = list(siloscope.open(path))
     assert np.array_equal([frame.depth for frame in frames], depth)
     assert np.array_equal(np.float32([frame.depth_unit for frame in frames]), np.float32(units))
 
@@ -77,7 +77,7 @@ def by_the_sdk(*command: str) -> None:
 
 
 def test_d435_of_2018_has_no_unit_after_its_images() -> None:
-    with siloscope.frames.open(realdata.path(*D435)) as source:
+    with siloscope.open(realdata.path(*D435)) as source:
         frames = list(source)
     assert [frame.depth.shape for frame in frames if frame.depth is not None] == [(480, 640)] * 2
     assert frames[0].depth_unit == pytest.approx(0.0010000000475, abs=1e-14)
@@ -116,8 +116,8 @@ def test_db3_extrinsics_are_written_column_by_column() -> None:
 
 
 def _one_message(data: bytes) -> Any:
-    from siloscope.frames.recording import Entry, Recording, Topic
-    from siloscope.frames.wire import Wire
+    from siloscope.io.recordings.recording import Entry, Recording, Topic
+    from siloscope.io.recordings.wire import Wire
 
     class Memory(Recording):
         def read(self, topic: Topic, entry: Entry) -> Wire:
@@ -151,26 +151,26 @@ def _two_cameras(folder: Path, accel: tuple[float, float, float] = (0.0, 0.0, -9
 
 def test_two_depth_streams_ask_which(tmp_path: Path) -> None:
     path = _two_cameras(tmp_path)
-    source = siloscope.frames.open(path)
+    source = siloscope.open(path)
     with pytest.raises(InputError, match=r"--stream: device_0/sensor_0/Depth_0, device_1/sensor_0/Depth_0"):
         list(source)
     assert [stream["chosen"] for stream in source.describe()["streams"]] == [False, False]
-    frame = next(iter(siloscope.frames.open(path, stream="device_1")))
+    frame = next(iter(siloscope.open(path, stream="device_1")))
     assert frame.depth is not None
     assert frame.depth[0, 0] == 1001
     with pytest.raises(UsageError, match="2 streams named 'Depth'"):
-        siloscope.frames.open(path, stream="Depth")
+        siloscope.open(path, stream="Depth")
 
 
 def test_gravity_is_turned_into_the_depth_camera(tmp_path: Path) -> None:
     """v_accel = R v_depth with R a quarter turn about x: the depth camera's y is the accelerometer's z."""
-    source = siloscope.frames.open(_two_cameras(tmp_path), stream="device_0")
+    source = siloscope.open(_two_cameras(tmp_path), stream="device_0")
     assert source.gravity is not None
     np.testing.assert_allclose(source.gravity, [0, 9.81, 0], atol=1e-6)
 
 
 def test_a_shaken_camera_has_no_gravity(tmp_path: Path) -> None:
-    source = siloscope.frames.open(_two_cameras(tmp_path, (9.0, 9.0, 9.0)), stream="device_0")
+    source = siloscope.open(_two_cameras(tmp_path, (9.0, 9.0, 9.0)), stream="device_0")
     assert source.gravity is None
     assert "15.59 m/s², not gravity" in source.provenance["gravity_from"]
 
@@ -189,7 +189,7 @@ def test_a_cut_recording_gives_the_frames_before_the_cut(tmp_path: Path, path: P
 
 def _read_before_the_cut(path: Path) -> int:
     try:
-        source = siloscope.frames.open(path)
+        source = siloscope.open(path)
     except InputError:
         return 0
     frames = []
@@ -207,12 +207,12 @@ def test_a_database_that_is_no_recording_is_refused(tmp_path: Path) -> None:
         base.execute("CREATE TABLE people (name TEXT)")
     base.close()
     with pytest.raises(InputError, match="no tables 'topics' and 'messages'"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
 
 
 def test_the_users_camera_and_unit_win() -> None:
     camera = Camera(64, 48, 57.0, 57.0, 31.5, 23.5)
-    frame = next(iter(siloscope.frames.open(FIXTURES[0], camera=camera, depth_unit=0.0005)))
+    frame = next(iter(siloscope.open(FIXTURES[0], camera=camera, depth_unit=0.0005)))
     assert (frame.camera, frame.depth_unit) == (camera, 0.0005)
 
 
@@ -225,4 +225,4 @@ def test_a_camera_message_cut_short_names_the_file(tmp_path: Path) -> None:
         base.execute(f"UPDATE messages SET data = substr(data, 1, 6) WHERE topic_id = ({topic})")
     base.close()
     with pytest.raises(InputError, match=r"short\.db3: message ends"):
-        siloscope.frames.open(path)
+        siloscope.open(path)

@@ -11,7 +11,7 @@ import pytest
 from mcap.writer import CompressionType, Writer
 
 import realdata
-import siloscope.frames
+import siloscope
 from bags import START_NS, Maker, Message, png16, quantised
 from siloscope import Camera, Frame, InputError
 from siloscope.cli import main
@@ -54,7 +54,7 @@ def drivers_messages(maker: Maker, count: int = 3) -> list[Message]:
 @pytest.mark.parametrize("container", CONTAINERS)
 def test_every_container_gives_the_same_frames(tmp_path: Path, container: str) -> None:
     path = write(tmp_path, container, drivers_messages(maker_of(container)))
-    with siloscope.frames.open(path) as source:
+    with siloscope.open(path) as source:
         frames = list(source)
     assert len(source) == len(frames) == 3
     for number, frame in enumerate(frames):
@@ -68,7 +68,7 @@ def test_every_container_gives_the_same_frames(tmp_path: Path, container: str) -
 
 
 def only_frame(path: Path, **options: Any) -> Frame:
-    (frame,) = siloscope.frames.open(path, **options)
+    (frame,) = siloscope.open(path, **options)
     return frame
 
 
@@ -126,7 +126,7 @@ def test_two_depth_topics_ask_which(tmp_path: Path, capsys: pytest.CaptureFixtur
     topics = ["/camera/depth/image_rect_raw", "/camera/aligned_depth_to_color/image_raw"]
     path = write(tmp_path, "ros1", [(topic, START_NS, maker.image(RAW, "16UC1")) for topic in topics])
     with pytest.raises(InputError, match=f"--stream: {', '.join(topics)}"):
-        siloscope.frames.open(path)[0]
+        siloscope.open(path)[0]
     assert main(["locate", str(path)]) == 3
     assert main(["info", str(path)]) == 0
     told = capsys.readouterr().out
@@ -137,7 +137,7 @@ def test_two_depth_topics_ask_which(tmp_path: Path, capsys: pytest.CaptureFixtur
 def test_infrared_is_not_depth(tmp_path: Path) -> None:
     path = write(tmp_path, "ros1", [("/camera/infra1/image_rect_raw", START_NS, Maker(1).image(RAW, "16UC1"))])
     with pytest.raises(InputError, match="no depth and no points"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
 
 
 CAMERA_CASES: dict[str, tuple[str, dict[str, Any], Camera]] = {
@@ -185,7 +185,7 @@ def test_intrinsics_that_are_none_are_refused_by_name(tmp_path: Path, fx: float)
         tmp_path, "ros2", [("/d/camera_info", START_NS, info), ("/d/image", START_NS, maker.image(RAW, "16UC1"))]
     )
     with pytest.raises(InputError, match=r"/d/camera_info: .*--camera"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
     assert only_frame(path, camera=CAMERA).camera == CAMERA
 
 
@@ -196,7 +196,7 @@ def test_an_unknown_lens_is_refused_by_name(tmp_path: Path) -> None:
         tmp_path, "ros2", [("/d/camera_info", START_NS, info), ("/d/image", START_NS, maker.image(RAW, "16UC1"))]
     )
     with pytest.raises(InputError, match="'thin_prism'"):
-        siloscope.frames.open(path)
+        siloscope.open(path)
 
 
 def test_gravity_goes_through_tf(tmp_path: Path) -> None:
@@ -263,7 +263,7 @@ def test_a_folder_of_several_files_is_one_recording(tmp_path: Path) -> None:
         one = maker.write(tmp_path / f"part{part}", [("/depth", START_NS, maker.image(RAW + part, "16UC1"))])
         (one / f"part{part}.db3").rename(folder / f"split_{part}.db3")
     (folder / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: 9\n")
-    frames = list(siloscope.frames.open(folder))
+    frames = list(siloscope.open(folder))
     assert [int(frame.depth[0, 0]) - int(RAW[0, 0]) for frame in frames if frame.depth is not None] == [2, 10]
 
 
@@ -274,7 +274,7 @@ def test_a_cut_recording_gives_the_frames_before_the_cut(tmp_path: Path, contain
     file = next(path.glob("*.mcap")) if path.is_dir() else path
     whole = file.read_bytes()
     file.write_bytes(whole[: len(whole) // 2])
-    source = siloscope.frames.open(file)
+    source = siloscope.open(file)
     frames = list(source)
     assert 1 <= len(frames) <= 59
     assert all(np.array_equal(frame.depth, RAW + number) for number, frame in enumerate(frames))
@@ -288,7 +288,7 @@ def test_a_damaged_message_costs_only_its_frame(tmp_path: Path) -> None:
     wrong.height = 49
     images = [maker.image(RAW, "16UC1"), wrong, maker.image(RAW, "16UC1")]
     path = write(tmp_path, "ros2", [("/depth", START_NS + i, image) for i, image in enumerate(images)])
-    source = siloscope.frames.open(path)
+    source = siloscope.open(path)
     assert len(list(source)) == 2
     assert source.problems == ["frame 1: image is declared 64 x 49 with 128 bytes a row, but 6144 bytes came"]
 
@@ -308,4 +308,4 @@ def test_a_damaged_checksum_is_told(tmp_path: Path) -> None:
     flipped = whole.find(RAW.tobytes()) + 99
     path.write_bytes(whole[:flipped] + bytes([whole[flipped] ^ 1]) + whole[flipped + 1 :])
     with pytest.raises(InputError, match="checksum"):
-        siloscope.frames.open(path)
+        siloscope.open(path)

@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from siloscope import Camera, Frame, InputError, UsageError
-from siloscope.region import box_mask, frame_points, label_mask, read_mask
+from siloscope.estimation.region import box_mask, frame_points, label_mask, read_mask
 
 CAMERA = Camera(4, 3, 2.0, 2.0, 1.5, 1.0)
 

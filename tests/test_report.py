@@ -6,7 +6,7 @@ import re
 from html.parser import HTMLParser
 from pathlib import Path
 
-from siloscope import report
+from siloscope.reporting import report
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

@@ -16,27 +16,26 @@ import pytest
 
 from siloscope import SiloPose, UsageError
 from siloscope.cli import main
-from siloscope.paper import metrics
-from siloscope.paper.challenges import SCALES, complex_feed, enlarged, eyes, feeds, large, views
-from siloscope.paper.discharges import PRINTED, perfect, perturbed, real
-from siloscope.paper.evaluation import published
-from siloscope.paper.evaluation.chapter import Chapter, Picture, Verdict
-from siloscope.paper.evaluation.page import page
-from siloscope.paper.evaluation.plan import Plan
-from siloscope.paper.evaluation.series import Series
-from siloscope.paper.evaluation.tables import Table, number, shown
-from siloscope.paper.evaluation.targets import CHAPTERS, NAMES, wanted
-from siloscope.paper.evaluation.verdicts import judged, listed
-from siloscope.paper.jobs import Job, key, program
-from siloscope.paper.packing import packed, unpacked
-from siloscope.paper.running import run
-from siloscope.paper.scenarios import scenario
-from siloscope.paper.sensor_trials import ACCELEROMETER_STD, SensorTrial, accelerometer, ideal_cloud
-from siloscope.paper.solvers import ALL, SOLVERS
-from siloscope.paper.stand_ins import FOUR_SENSORS
-from siloscope.paper.store import Store
-from siloscope.paper.trials import Observation, Trial
-from siloscope.scene import Silo
+from siloscope.reproduction.challenges import SCALES, complex_feed, enlarged, eyes, feeds, large, views
+from siloscope.reproduction.discharges import PRINTED, perfect, perturbed, real
+from siloscope.reproduction.evaluation import published
+from siloscope.reproduction.evaluation.chapter import Chapter, Picture, Verdict
+from siloscope.reproduction.evaluation.page import page
+from siloscope.reproduction.evaluation.plan import Plan
+from siloscope.reproduction.evaluation.series import Series
+from siloscope.reproduction.evaluation.tables import Table, number, shown
+from siloscope.reproduction.evaluation.targets import CHAPTERS, NAMES, wanted
+from siloscope.reproduction.evaluation.verdicts import judged, listed
+from siloscope.reproduction.jobs import Job, key, program
+from siloscope.reproduction.packing import packed, unpacked
+from siloscope.reproduction.running import run
+from siloscope.reproduction.sensor_trials import ACCELEROMETER_STD, SensorTrial, accelerometer, ideal_cloud
+from siloscope.reproduction.solvers import ALL, SOLVERS
+from siloscope.reproduction.store import Store
+from siloscope.reproduction.trials import Observation, Trial
+from siloscope.simulation import Silo, metrics
+from siloscope.simulation.scenarios import scenario
+from siloscope.simulation.stand_ins import FOUR_SENSORS
 
 
 @dataclass(frozen=True)
@@ -133,7 +132,7 @@ def test_keys_tell_settings_apart() -> None:
 def test_the_program_counts_as_a_setting(monkeypatch: pytest.MonkeyPatch) -> None:
     trial = perfect()[0].trials(3)[0]
     before = key(trial)
-    monkeypatch.setattr("siloscope.paper.jobs.program", lambda: "another")
+    monkeypatch.setattr("siloscope.reproduction.jobs.program", lambda: "another")
     assert key(trial) != before
     assert program().startswith("0.")
 
@@ -428,8 +427,8 @@ def test_all_writes_a_page_with_every_table_and_picture(everything: Path) -> Non
 def test_a_second_run_works_nothing_and_writes_the_same(
     everything: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("siloscope.paper.trials.Trial.run", lambda _: pytest.fail("ran again"))
-    monkeypatch.setattr("siloscope.paper.evaluation.reproduction._drawn", lambda path, *_: path)
+    monkeypatch.setattr("siloscope.reproduction.trials.Trial.run", lambda _: pytest.fail("ran again"))
+    monkeypatch.setattr("siloscope.reproduction.evaluation.reproduction._drawn", lambda path, *_: path)
     before = (everything / "results.md").read_text()
     capsys.readouterr()
     assert main(["reproduce", "--steps", "1", "--jobs", "1", "--out", str(everything), "--json"]) == 0

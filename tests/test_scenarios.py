@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from siloscope import Camera, UsageError, sensors
-from siloscope.paper.scenarios import (
+from siloscope.simulation import ASTRA_S, DEFECTS, PERFECT, Defects, SensorModel, defects, sensor_model
+from siloscope.simulation.scenarios import (
     COMPARISON_SILO,
     SCENARIOS,
     SILO1,
@@ -18,7 +19,6 @@ from siloscope.paper.scenarios import (
     random_scene,
     scenario,
 )
-from siloscope.scene import ASTRA_S, DEFECTS, PERFECT, Defects, SensorModel, defects, sensor_model
 
 SMALL = Camera(width=96, height=72, fx=85.5, fy=85.5, cx=47.5, cy=35.5)
 NO_SILO = ("brim-full", "flat-wall", "room-corner", "square-shaft", "sphere", "noise", "nothing")

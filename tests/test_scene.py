@@ -12,8 +12,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from siloscope import Camera, SiloPose, UsageError
-from siloscope.paper.scenarios import SCENARIOS, SILO1, SILO2, SILO3, looking_at, random_scene, scenario
-from siloscope.scene import ASTRA_S, Feed, Scene, SensorModel, Silo, SimulatedFrame, content_of, discharge
+from siloscope.simulation import ASTRA_S, Feed, Scene, SensorModel, Silo, SimulatedFrame, content_of, discharge
+from siloscope.simulation.scenarios import SCENARIOS, SILO1, SILO2, SILO3, looking_at, random_scene, scenario
 
 SMALL = Camera(width=96, height=72, fx=85.5, fy=85.5, cx=47.5, cy=35.5)
 SHAPES = ("gaussian", "funnel", "mound", "flat", "tilted", "lumpy", "rathole", "tilted+lumpy+rathole", "funnel+lumpy")

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from siloscope import Camera, SiloPose, UsageError
-from siloscope.paper.scenarios import SILO1, SILO2, SILO3
-from siloscope.scene import Defects, Feed, Scene, Silo, SimulatedFrame
+from siloscope.simulation import Defects, Feed, Scene, Silo, SimulatedFrame
+from siloscope.simulation.scenarios import SILO1, SILO2, SILO3
 
 SMALL = Camera(width=96, height=72, fx=85.5, fy=85.5, cx=47.5, cy=35.5)
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from siloscope import Camera, _core
-from siloscope.paper.scenarios import SILO2
-from siloscope.scene import ASTRA_S, Defects, Feed, Scene, SensorModel, SimulatedFrame
+from siloscope.simulation import ASTRA_S, Defects, Feed, Scene, SensorModel, SimulatedFrame
+from siloscope.simulation.scenarios import SILO2
 
 CAMERA = Camera(width=320, height=240, fx=285.0, fy=285.0, cx=159.5, cy=119.5)
 SCENE = replace(SILO2, camera=CAMERA, feed=Feed("funnel", 0.3))

@@ -10,10 +10,10 @@ import pytest
 
 import realdata
 import siloscope
-from siloscope import Estimate, Frame, SiloPose, shape_tensor, steps
-from siloscope.paper import metrics
-from siloscope.paper.scenarios import random_scene, scenario
-from siloscope.scene import ASTRA_S, Feed, Scene, SensorModel
+from siloscope import Estimate, Frame, SiloPose
+from siloscope.estimation import shape_tensor, steps
+from siloscope.simulation import ASTRA_S, Feed, Scene, SensorModel, metrics
+from siloscope.simulation.scenarios import random_scene, scenario
 
 NOISE = SensorModel(noise=ASTRA_S.noise, unit=0.001)
 """The Astra S without its bias, in millimetres."""
@@ -98,7 +98,7 @@ def test_what_shows_no_wall_is_refused(world: str, sensor: str) -> None:
     estimate, _ = locate(scene if sensor == "perfect" else replace(scene, sensor=NOISE, seed=2))
     assert estimate.status == "refused"
     assert estimate.pose is None
-    assert estimate.reason in siloscope.surface.reasons()
+    assert estimate.reason in siloscope.estimation.surface.reasons()
     assert estimate.message
 
 
@@ -155,7 +155,7 @@ def test_too_few_points_are_refused_not_guessed() -> None:
 
 
 def recording(*parts: str) -> Frame:
-    return next(iter(siloscope.frames.open(realdata.path(*parts))))
+    return next(iter(siloscope.open(realdata.path(*parts))))
 
 
 def angle_to(estimate: Estimate, axis: Any) -> float:

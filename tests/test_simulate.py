@@ -11,10 +11,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from siloscope import camera_files, frames
+import siloscope
 from siloscope.cli import main
-from siloscope.paper.scenarios import SILO2
-from siloscope.scene import ASTRA_S, Feed
+from siloscope.io import camera_files
+from siloscope.simulation import ASTRA_S, Feed
+from siloscope.simulation.scenarios import SILO2
 
 SMALL = ["--width", "64", "--height", "48"]
 
@@ -45,7 +46,7 @@ def test_the_reader_finds_camera_and_unit_and_reads_the_frames(tmp_path: Path) -
     assert (
         main(["simulate", "--out", str(out), "--scenario", "silo2", "--sensor", "astra-s", "--steps", "2", *SMALL]) == 0
     )
-    source = frames.open(out)
+    source = siloscope.open(out)
     camera = camera_files.load(out / "camera.json")
     assert (camera.width, camera.fx, camera.cx) == (64, pytest.approx(57.03), pytest.approx(31.5))
     read = list(source)

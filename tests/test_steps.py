@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 import reference
-from siloscope import InputError, SiloPose, UsageError, steps
-from siloscope.paper.scenarios import scenario
+from siloscope import InputError, SiloPose, UsageError
+from siloscope.estimation import steps
+from siloscope.simulation.scenarios import scenario
 
 SCENE = scenario("silo-r1")
 CAMERA = replace(SCENE.camera, width=160, height=120, fx=142.6, fy=142.6, cx=79.5, cy=59.5)

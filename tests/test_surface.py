@@ -8,13 +8,23 @@ import numpy as np
 import pytest
 
 from siloscope import Camera, Estimate, SiloPose, sensors
-from siloscope.paper import metrics
-from siloscope.paper.discharges import real
-from siloscope.paper.scenarios import random_scene, scenario
-from siloscope.paper.stand_ins import IRREGULAR, real_silo
-from siloscope.scene import ASTRA_S, Defects, Feed, Scene, SensorModel, Silo, defects, discharge, sensor_model
+from siloscope.estimation.surface import fit_depth, reasons
+from siloscope.reproduction.discharges import real
 from siloscope.sensors import SensorProfile
-from siloscope.surface import fit_depth, reasons
+from siloscope.simulation import (
+    ASTRA_S,
+    Defects,
+    Feed,
+    Scene,
+    SensorModel,
+    Silo,
+    defects,
+    discharge,
+    metrics,
+    sensor_model,
+)
+from siloscope.simulation.scenarios import random_scene, scenario
+from siloscope.simulation.stand_ins import IRREGULAR, real_silo
 
 NAMES = ("silo1", "silo2", "silo3")
 POSE = ("r_x", "r_y", "t_x", "t_y")

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from siloscope import Calibration, Camera, Estimate, Frame, calibrate, locate
-from siloscope.paper.scenarios import scenario
-from siloscope.scene import ASTRA_S, Feed, Scene, discharge
-from siloscope.thinning import STEP, thinned
+from siloscope.estimation.thinning import STEP, thinned
+from siloscope.simulation import ASTRA_S, Feed, Scene, discharge
+from siloscope.simulation.scenarios import scenario
 
 PROFILE = "orbbec-astra-s"
 SILO3 = replace(scenario("silo3"), sensor=ASTRA_S)

@@ -14,7 +14,7 @@ import siloscope
 from silos import known, scene
 from siloscope.content import Content, Parts
 from siloscope.errors import InputError, UsageError
-from siloscope.scene import Feed
+from siloscope.simulation import Feed
 from siloscope.track import _told
 from siloscope.tracking.events import legs
 from siloscope.tracking.story import DAY, Moment, utc

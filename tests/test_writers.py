@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 import frame_files as made
-import siloscope.frames
-from siloscope import Frame, UsageError, writers
+import siloscope
+from siloscope import Frame, UsageError
+from siloscope.io import writers
 
 
 def back(path: Path) -> Frame:
-    (frame,) = siloscope.frames.open(path)
+    (frame,) = siloscope.open(path)
     return frame
 
 

@@ -10,14 +10,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.camera import Camera
-from siloscope.paper.discharges import EXACT
-from siloscope.paper.metrics import LABELS
-from siloscope.paper.scenarios import scenario
-from siloscope.paper.stand_ins import REAL_PROFILE, real_silo
-from siloscope.pose import SiloPose
-from siloscope.scene import ASTRA_S, PERFECT, Scene, SensorModel, Silo
+from siloscope.reproduction.discharges import EXACT
 from siloscope.sensors import SensorProfile, load
+from siloscope.simulation import ASTRA_S, PERFECT, Scene, SensorModel, Silo
+from siloscope.simulation.metrics import LABELS
+from siloscope.simulation.scenarios import scenario
+from siloscope.simulation.stand_ins import REAL_PROFILE, real_silo
+from siloscope.types.camera import Camera
+from siloscope.types.pose import SiloPose
 
 SILOS = ("silo1", "silo2", "silo3", "silo-r1", "silo-r2")
 LEVELS = (0.1, 0.35)

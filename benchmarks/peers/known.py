@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.paper.sensor_trials import ideal_cloud
-from siloscope.scene import Silo
+from siloscope.reproduction.sensor_trials import ideal_cloud
+from siloscope.simulation import Silo
 
 SPACING = 0.03
 """Distance between neighbouring points, m."""

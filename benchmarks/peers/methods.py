@@ -21,7 +21,7 @@ from known import Target, target_of
 from numpy.typing import NDArray
 
 from siloscope import locate
-from siloscope.pose import SiloPose
+from siloscope.types.pose import SiloPose
 
 PRIOR = 0.6
 """Largest angle between the axis and the optical axis that a user would promise, rad."""

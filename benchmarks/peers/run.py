@@ -23,8 +23,8 @@ from rich.progress import track
 from score import distances
 
 from siloscope import __version__
-from siloscope.paper.evaluation.tables import Cell, Table, number
-from siloscope.paper.timing import machine
+from siloscope.reproduction.evaluation.tables import Cell, Table, number
+from siloscope.reproduction.timing import machine
 
 FAILURE = 0.1
 """Distance from which on an answer is no answer, m; Eq. 11 saturates, so this is farther off than it sounds."""
@@ -162,7 +162,7 @@ def _of(results: Sequence[Result], method: Method, kind: str) -> float | None:
 
 def plot(results: Sequence[Result], path: Path) -> None:
     """Median distance over median time, a panel a kind of frame; numbers stand for methods."""
-    from siloscope.plots.style import INK, figure, heading, png
+    from siloscope.reporting.plots.style import INK, figure, heading, png
 
     made = figure(12.0, 11.0)
     panels = made.subplots(2, 2, sharex=True, sharey=True).ravel()
@@ -179,7 +179,7 @@ def plot(results: Sequence[Result], path: Path) -> None:
 def _panel(axes: Any, results: Sequence[Result], kind: str) -> None:
     from matplotlib.ticker import StrMethodFormatter
 
-    from siloscope.plots.style import BLUE, INK, MUTED, tidy
+    from siloscope.reporting.plots.style import BLUE, INK, MUTED, tidy
 
     labels: list[tuple[tuple[float, float], list[int]]] = []
     for place, method in enumerate(METHODS, start=1):

@@ -8,8 +8,8 @@ import numpy as np
 from frames import Shown
 from methods import Found
 
-from siloscope.paper import metrics
-from siloscope.paper.trials import STRIDE
+from siloscope.reproduction.trials import STRIDE
+from siloscope.simulation import metrics
 
 
 def distances(frame: Shown, found: Sequence[Found]) -> list[float]:

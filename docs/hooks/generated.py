@@ -50,7 +50,7 @@ def _help(command: str) -> str:
 
 def reasons() -> str:
     """Every reason for which a frame is refused."""
-    from siloscope.surface import reasons as known
+    from siloscope.estimation.surface import reasons as known
 
     return _advice(known())
 
@@ -67,14 +67,14 @@ def _advice(known: dict[str, tuple[str, str]]) -> str:
 
 def quality() -> str:
     """Every remark on a calibration."""
-    from siloscope.calibration import QUALITY
+    from siloscope.types.calibration import QUALITY
 
     return _meanings("code", QUALITY)
 
 
 def frame_statuses() -> str:
     """What may become of a frame in a calibration."""
-    from siloscope.calibration import STATUSES
+    from siloscope.types.calibration import STATUSES
 
     return _meanings("status", STATUSES)
 

@@ -1,18 +1,19 @@
 """Finds a silo's axis, geometry and content from one depth camera."""
 
-from siloscope import frames
 from siloscope._core import __version__
 from siloscope.calibrate import calibrate
-from siloscope.calibration import Calibration
-from siloscope.camera import Camera
-from siloscope.content import Content, SurfaceMap, measure, surface_map, volume_between
+from siloscope.content import Content, SurfaceMap, surface_map, volume_between
 from siloscope.errors import InputError, SiloscopeError, UsageError
-from siloscope.estimate import Estimate, Ratios, SiloGeometry
-from siloscope.frame import Frame
+from siloscope.io import open
 from siloscope.locate import locate
-from siloscope.pose import SiloPose
+from siloscope.measure import measure
 from siloscope.track import track
 from siloscope.tracking.story import Track
+from siloscope.types.calibration import Calibration
+from siloscope.types.camera import Camera
+from siloscope.types.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.types.frame import Frame
+from siloscope.types.pose import SiloPose
 
 __all__ = [
     "Calibration",
@@ -30,9 +31,9 @@ __all__ = [
     "UsageError",
     "__version__",
     "calibrate",
-    "frames",
     "locate",
     "measure",
+    "open",
     "surface_map",
     "track",
     "volume_between",

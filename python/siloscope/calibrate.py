@@ -15,22 +15,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from siloscope import frames as readers
 from siloscope import sensors
-from siloscope.calibration import Calibration, Evidence, FrameRecord
-from siloscope.camera import Camera
 from siloscope.errors import InputError, UsageError
-from siloscope.estimate import Estimate, SiloGeometry
-from siloscope.frame import Frame
-from siloscope.frames import FrameSource
-from siloscope.fusion import Fused, Stack, Sums, fuse, sums
+from siloscope.estimation.surface import PARAMETERS, SurfaceEvidence, geometry
+from siloscope.estimation.thinning import thinned
+from siloscope.fusion.change_point import Move, find_moves, may_have_moved
+from siloscope.fusion.relinearize import at_bias, bias_is_free, straightened
+from siloscope.fusion.solve import Fused, Stack, Sums, fuse, sums
+from siloscope.io import FrameSource
+from siloscope.io import open as open_frames
 from siloscope.locate import locate
-from siloscope.moves import Move, find_moves, may_have_moved
-from siloscope.pose import SiloPose
 from siloscope.sensors import SensorProfile
-from siloscope.straight import at_bias, bias_is_free, straightened
-from siloscope.surface import PARAMETERS, SurfaceEvidence, geometry
-from siloscope.thinning import thinned
+from siloscope.types.calibration import Calibration, Evidence, FrameRecord
+from siloscope.types.camera import Camera
+from siloscope.types.estimate import Estimate, SiloGeometry
+from siloscope.types.frame import Frame
+from siloscope.types.pose import SiloPose
 
 RULES = ("information", "mean-of-last-10")
 """How frames become one: weighed by their information, or the mean of the last 10 answers (section 2.4.4)."""
@@ -94,7 +94,7 @@ def calibrate(
     Parameters
     ----------
     frames : files, frame source, or iterable of Frame, depth array or Estimate
-        A path or several, what `siloscope.frames.open` gives, frames, arrays, or answers of `locate` (method surface).
+        A path or several, what `siloscope.open` gives, frames, arrays, or answers of `locate` (method surface).
     camera, sensor, depth_unit, diameter, gravity
         As for `locate`. Estimates bring their own.
     continue_from : Calibration or path, optional
@@ -216,9 +216,9 @@ def _brought(answers: list[_Answer]) -> dict[str, Any]:
 
 def _source(frames: Any, camera: Camera | None, depth_unit: float | None) -> Iterable[Any]:
     if isinstance(frames, str | PathLike):
-        return readers.open(frames, camera=camera, depth_unit=depth_unit)
+        return open_frames(frames, camera=camera, depth_unit=depth_unit)
     if isinstance(frames, list | tuple) and frames and all(isinstance(f, str | PathLike) for f in frames):
-        return readers.open(frames, camera=camera, depth_unit=depth_unit)
+        return open_frames(frames, camera=camera, depth_unit=depth_unit)
     return frames  # type: ignore[no-any-return]
 
 

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from siloscope import sensors, shape_tensor, surface
-from siloscope.camera import Camera, is_number
+from siloscope import sensors
 from siloscope.errors import UsageError
-from siloscope.estimate import Estimate
-from siloscope.frame import Frame
-from siloscope.inputs import Prepared, prepare
+from siloscope.estimation import shape_tensor, surface
+from siloscope.estimation.inputs import Prepared, prepare
 from siloscope.sensors import SensorProfile
+from siloscope.types.camera import Camera, is_number
+from siloscope.types.estimate import Estimate
+from siloscope.types.frame import Frame
 
 Number = float | None
 

@@ -8,15 +8,16 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
 
-from siloscope import frames as readers
-from siloscope.calibration import Calibration
-from siloscope.content import Content, measure
+from siloscope.content import Content
 from siloscope.errors import InputError, UsageError
-from siloscope.frame import Frame
-from siloscope.frames import FrameSource
+from siloscope.io import FrameSource
+from siloscope.io import open as open_frames
+from siloscope.measure import measure
 from siloscope.tracking.events import events
 from siloscope.tracking.story import Moment, Reading, Track
 from siloscope.tracking.use import use
+from siloscope.types.calibration import Calibration
+from siloscope.types.frame import Frame
 
 TOGETHER = 120.0
 """Seconds between two frames that still tell whether the content moves while they are taken."""
@@ -41,7 +42,7 @@ def track(
     Parameters
     ----------
     frames : files, frame source, or iterable of Frame
-        A path or several, what `siloscope.frames.open` gives, or frames.
+        A path or several, what `siloscope.open` gives, or frames.
     calibration : Calibration or path
         Pose and geometry.
     interval : float, optional
@@ -65,7 +66,7 @@ def track(
     if start is not None and (interval is None or not math.isfinite(start)):
         raise UsageError("start needs an interval: the frames after the first are that many seconds apart")
     silo = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
-    source = readers.open(frames) if _is_path(frames) else frames  # type: ignore[arg-type]
+    source = open_frames(frames) if _is_path(frames) else frames  # type: ignore[arg-type]
     clock = _Clock(interval, start)
     moments: list[Moment] = []
     last: Content | None = None

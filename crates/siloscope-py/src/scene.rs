@@ -14,7 +14,7 @@ type Frame<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u8>>, Bound<'p
 type Reading<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<bool>>);
 type Laws<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<f64>>);
 
-/// Exact depth (H*W,), labels (H*W,) and normals (H*W, 3) of a `siloscope.scene.Scene`.
+/// Exact depth (H*W,), labels (H*W,) and normals (H*W, 3) of a `siloscope.simulation.Scene`.
 #[pyfunction]
 fn render_scene<'py>(py: Python<'py>, scene: &Bound<'py, PyAny>, threads: usize) -> PyResult<Frame<'py>> {
     let world = world(scene)?;
@@ -27,7 +27,7 @@ fn render_scene<'py>(py: Python<'py>, scene: &Bound<'py, PyAny>, threads: usize)
     Ok((PyArray1::from_vec(py, depth), PyArray1::from_vec(py, labels), normals))
 }
 
-/// Depth (H*W,) as a `siloscope.scene.SensorModel` gives it, and which pixels are false returns.
+/// Depth (H*W,) as a `siloscope.simulation.SensorModel` gives it, and which pixels are false returns.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 fn measure_depth<'py>(
@@ -176,7 +176,7 @@ fn silo_world(scene: &Bound<'_, PyAny>, silo: Silo) -> PyResult<SiloWorld> {
     Ok(SiloWorld { wall: wall(&plan, &silo)?, clutter: clutter(&plan)?, silo, feed })
 }
 
-/// Reads the wall of a resolved `siloscope.scene.Defects`; None where it is perfect.
+/// Reads the wall of a resolved `siloscope.simulation.Defects`; None where it is perfect.
 fn wall(plan: &Bound<'_, PyAny>, silo: &Silo) -> PyResult<Option<Wall>> {
     let relief = Relief {
         radius: silo.radius,
@@ -257,7 +257,7 @@ fn silo(object: &Bound<'_, PyAny>) -> PyResult<Silo> {
     Ok(silo)
 }
 
-/// Reads a `siloscope.scene.Feed`; its `resolved` numbers have no None left.
+/// Reads a `siloscope.simulation.Feed`; its `resolved` numbers have no None left.
 fn feed(object: &Bound<'_, PyAny>, silo: &Silo) -> PyResult<Option<Feed>> {
     if object.is_none() {
         return Ok(None);

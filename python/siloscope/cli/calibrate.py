@@ -10,12 +10,12 @@ import typer
 from rich.console import Console
 
 import siloscope
-from siloscope.calibration import QUALITY, Calibration
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, REFUSED, check_place, print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.cli.summary import headline, pose_table, silo_line, tilt_line
-from siloscope.frames import FrameSource
+from siloscope.io import FrameSource
+from siloscope.types.calibration import QUALITY, Calibration
 
 
 def calibrate(
@@ -45,7 +45,7 @@ def calibrate(
     """
     check_place(out)
     down = None if gravity is None else options.numbers(gravity, 3, "--gravity")
-    with siloscope.frames.open(files, camera=camera, depth_unit=depth_unit, stream=stream) as source:
+    with siloscope.open(files, camera=camera, depth_unit=depth_unit, stream=stream) as source:
         found = siloscope.calibrate(
             source,
             sensor=sensor,

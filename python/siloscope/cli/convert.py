@@ -7,12 +7,12 @@ from typing import Annotated, Any
 
 import typer
 
-import siloscope.frames
+import siloscope
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, print_json, writing
 from siloscope.cli.progress import say, track
-from siloscope.conversion import Sink, open_sink
-from siloscope.frames import FrameSource
+from siloscope.io import FrameSource
+from siloscope.io.conversion import Sink, open_sink
 from siloscope.wording import counted
 
 
@@ -45,7 +45,7 @@ def convert(
     Exit code 5 tells that some frames could not be read.
     """
     given = {"camera": camera, "depth_unit": depth_unit, "stream": stream, "ray_length": ray_length}
-    with siloscope.frames.open(files, **given) as source:  # type: ignore[arg-type]
+    with siloscope.open(files, **given) as source:  # type: ignore[arg-type]
         with writing(out):
             sink = open_sink(out, raw_unit)
         document = _document(source, sink, out)

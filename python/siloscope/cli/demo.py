@@ -7,12 +7,12 @@ from typing import Annotated, Any
 
 import typer
 
-from siloscope.calibration import Calibration
 from siloscope.cli import options
 from siloscope.cli.outcome import print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.content import Content
-from siloscope.demo import Step, fused, locate_all, measured, scenes, write_frame
+from siloscope.reporting.demo import Step, fused, locate_all, measured, scenes, write_frame
+from siloscope.types.calibration import Calibration
 
 
 def demo(
@@ -41,7 +41,7 @@ def demo(
 
 
 def _write(done: list[Step], calibration: Calibration, contents: list[Content], out: Path) -> Path:
-    from siloscope.demo.page import page
+    from siloscope.reporting.demo.page import page
 
     finished = page(done, calibration, contents)
     with writing(out):

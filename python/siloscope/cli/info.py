@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-import siloscope.frames
+import siloscope
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, print_json
 from siloscope.cli.progress import track
@@ -28,7 +28,7 @@ def info(
 
     With --check, exit code 5 tells that some frames are damaged.
     """
-    with siloscope.frames.open(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
+    with siloscope.open(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
         read = sum(1 for _ in track(source, "reading")) if check else None
         document = source.describe() | ({"read": read} if check else {})
     if as_json:

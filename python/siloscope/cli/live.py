@@ -18,15 +18,16 @@ from rich.live import Live
 from rich.text import Text
 
 import siloscope
-from siloscope import camera_files, documents
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL
 from siloscope.cli.progress import say
 from siloscope.cli.summary import pose_table, ratios_line, silo_line, tilt_line
 from siloscope.errors import InputError
-from siloscope.estimate import Estimate
-from siloscope.frame import Frame
-from siloscope.live import SensorProcess, sensor, turn_for_more_wall
+from siloscope.io import camera_files
+from siloscope.schema import documents
+from siloscope.sensors.live import SensorProcess, sensor, turn_for_more_wall
+from siloscope.types.estimate import Estimate
+from siloscope.types.frame import Frame
 
 
 def live(
@@ -79,7 +80,7 @@ def _frames(
 ) -> Iterator[Iterable[Frame]]:
     """Frames of a live camera, which tells its unit itself, or of a recording."""
     if source not in ("realsense", "orbbec"):
-        with siloscope.frames.open(source, camera=camera, depth_unit=depth_unit, stream=stream) as recording:
+        with siloscope.open(source, camera=camera, depth_unit=depth_unit, stream=stream) as recording:
             yield recording
         return
     with SensorProcess(sensor(source)) as process:

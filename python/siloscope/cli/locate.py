@@ -9,16 +9,16 @@ import numpy as np
 import typer
 
 import siloscope
-from siloscope import region
 from siloscope.cli import options
 from siloscope.cli.outcome import REFUSED, print_json, writing
 from siloscope.cli.progress import say
 from siloscope.cli.summary import print_estimate
 from siloscope.errors import InputError
-from siloscope.estimate import Estimate
-from siloscope.frame import Frame
-from siloscope.inputs import metres
-from siloscope.region import Mask
+from siloscope.estimation import region
+from siloscope.estimation.inputs import metres
+from siloscope.estimation.region import Mask
+from siloscope.types.estimate import Estimate
+from siloscope.types.frame import Frame
 from siloscope.wording import counted
 
 
@@ -55,7 +55,7 @@ def locate(
 
     Exit code 4 tells that the frame was read well but does not show enough wall; the answer then says why.
     """
-    with siloscope.frames.open(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
+    with siloscope.open(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
         frame = options.one_frame(source, number)
         several = source.frame_count != 1
     if several and not as_json:
@@ -98,7 +98,7 @@ def within(frame: Frame, chosen: Mask | None, box: tuple[float, ...] | None) -> 
 
 
 def _write(out: Path, frame: Frame, estimate: Estimate, shown: Mask | None) -> None:
-    from siloscope.results import write_results
+    from siloscope.reporting.results import write_results
 
     with writing(out):
         written = write_results(out, frame, estimate, shown)

@@ -17,7 +17,7 @@ from siloscope.cli.outcome import REFUSED, print_json, writing
 from siloscope.cli.progress import say
 from siloscope.cli.summary import headline
 from siloscope.content import Content
-from siloscope.frame import Frame
+from siloscope.types.frame import Frame
 from siloscope.wording import counted, with_std
 
 CalibrationFile = Annotated[
@@ -95,12 +95,12 @@ def measure(
 
 
 def _frame(file: Path, number: int, place: dict[str, Any]) -> Frame:
-    with siloscope.frames.open(file, **place) as source:
+    with siloscope.open(file, **place) as source:
         return options.one_frame(source, number)
 
 
 def _mask(mask: Path, frame: Frame) -> Any:
-    from siloscope import region
+    from siloscope.estimation import region
 
     shape = frame.points.shape[:-1] if frame.points is not None else frame.depth.shape  # type: ignore[union-attr]
     return region.read_mask(mask, shape)
@@ -108,7 +108,7 @@ def _mask(mask: Path, frame: Frame) -> Any:
 
 def _answer(content: Content, out: Path | None, as_json: bool) -> int:
     if out is not None:
-        from siloscope.content.files import write_content
+        from siloscope.reporting.content_files import write_content
 
         with writing(out):
             written = write_content(out, content)

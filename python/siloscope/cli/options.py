@@ -9,8 +9,8 @@ from typing import Annotated
 import typer
 
 from siloscope.errors import InputError, UsageError
-from siloscope.frame import Frame
-from siloscope.frames import FrameSource
+from siloscope.io import FrameSource
+from siloscope.types.frame import Frame
 
 CameraFile = Annotated[
     Path | None, typer.Option("--camera", help="Intrinsics: JSON, TOML, ROS YAML or rs-enumerate-devices text.")

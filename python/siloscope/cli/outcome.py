@@ -14,8 +14,8 @@ from typing import Any
 
 import typer
 
-from siloscope import documents
 from siloscope.errors import SiloscopeError, UsageError
+from siloscope.schema import documents
 
 REFUSED = 4
 """Read well, but the frame does not show enough wall."""

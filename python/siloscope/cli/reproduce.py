@@ -36,8 +36,8 @@ def reproduce(
     Writes results.md, and its tables (CSV) and pictures (PNG) into the folder results beside it. Every finished frame
     is kept there too: an interrupted run goes on where it stopped when it is started again.
     """
-    from siloscope.paper.evaluation.plan import Plan
-    from siloscope.paper.evaluation.reproduction import Reproduction
+    from siloscope.reproduction.evaluation.plan import Plan
+    from siloscope.reproduction.evaluation.reproduction import Reproduction
 
     names = tables or []
     with writing(out):

@@ -10,14 +10,15 @@ from typing import Annotated, Any
 
 import typer
 
-from siloscope import __version__, camera_files, writers
-from siloscope.camera import Camera
+from siloscope import __version__
 from siloscope.cli.outcome import print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.errors import UsageError
-from siloscope.paper.scenarios import SCENARIOS, scenario
-from siloscope.pose import SiloPose
-from siloscope.scene import DEFECTS, Feed, Scene, SimulatedFrame, defects, discharge, sensor_model
+from siloscope.io import camera_files, writers
+from siloscope.simulation import DEFECTS, Feed, Scene, SimulatedFrame, defects, discharge, sensor_model
+from siloscope.simulation.scenarios import SCENARIOS, scenario
+from siloscope.types.camera import Camera
+from siloscope.types.pose import SiloPose
 from siloscope.wording import counted
 
 MOST_STEPS = 100_000

@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from siloscope.calibration import Calibration
-from siloscope.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.types.calibration import Calibration
+from siloscope.types.estimate import Estimate, Ratios, SiloGeometry
 from siloscope.wording import with_std
 
 _ROWS = (

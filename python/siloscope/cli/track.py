@@ -13,14 +13,14 @@ from rich.markup import escape
 from rich.table import Table
 
 import siloscope
-from siloscope import documents
 from siloscope.cli import measure as one
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, REFUSED, print_json, writing
 from siloscope.cli.progress import say
 from siloscope.cli.progress import track as bar
 from siloscope.errors import UsageError
-from siloscope.frames import FrameSource
+from siloscope.io import FrameSource
+from siloscope.schema import documents
 from siloscope.tracking.story import Reading, Track
 from siloscope.wording import counted, with_std
 
@@ -70,7 +70,7 @@ def track(
     if parquet and out is None:
         raise UsageError("--parquet writes a file; give --out DIR")
     silo = siloscope.Calibration.load(calibration)
-    with siloscope.frames.open(files, camera=camera, depth_unit=depth_unit, stream=stream) as source:
+    with siloscope.open(files, camera=camera, depth_unit=depth_unit, stream=stream) as source:
         found = siloscope.track(
             source,
             silo,
@@ -84,7 +84,7 @@ def track(
 
 def _answer(found: Track, out: Path | None, parquet: bool, lines: bool, as_json: bool) -> int:
     if out is not None:
-        from siloscope.tracking.page import write_track
+        from siloscope.reporting.track_page import write_track
 
         with writing(out):
             written = write_track(out, found, parquet)
@@ -122,7 +122,7 @@ def _time(text: str | None) -> float | None:
 
 def _print(found: Track) -> None:
     """The table of readings, the events, and the forecast on stdout."""
-    from siloscope.tracking.page import moment, when
+    from siloscope.reporting.track_page import moment, when
 
     console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else WIDTH)
     table = Table(box=None, padding=(0, 2, 0, 0))
@@ -149,7 +149,7 @@ def _print(found: Track) -> None:
 
 
 def _row(reading: Reading, weighed: bool) -> tuple[str, ...]:
-    from siloscope.tracking.page import when
+    from siloscope.reporting.track_page import when
 
     def number(value: float | None, digits: int) -> str:
         return "" if value is None else f"{value:.{digits}f}"

@@ -2,7 +2,6 @@
 
 from siloscope.content.capacity import Datasheet, Strapping
 from siloscope.content.density import Density, products
-from siloscope.content.measuring import measure
 from siloscope.content.quality import QUALITY, Remark
 from siloscope.content.result import Content, Level, Parts
 from siloscope.content.surface_map import Shape, SurfaceMap, surface_map, volume_between
@@ -18,7 +17,6 @@ __all__ = [
     "Shape",
     "Strapping",
     "SurfaceMap",
-    "measure",
     "products",
     "surface_map",
     "volume_between",

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from siloscope.errors import InputError, UsageError
-from siloscope.estimate import SiloGeometry
+from siloscope.types.estimate import SiloGeometry
 
 LARGEST_FILE = 10_000_000
 """Bytes of a strapping table."""

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import sensors
-from siloscope.calibration import Calibration
 from siloscope.content.capacity import Datasheet, Lengths, complete
 from siloscope.errors import InputError, UsageError
-from siloscope.estimate import SiloGeometry
-from siloscope.pose import SiloPose
 from siloscope.sensors import SensorProfile
+from siloscope.types.calibration import Calibration
+from siloscope.types.estimate import SiloGeometry
+from siloscope.types.pose import SiloPose
 
 PARAMETERS = ("r_x", "r_y", "t_x", "t_y", "radius", "cylinder_bottom", "apex", "offset", "scale", "quadratic")
 """Order of the covariance; the last three are the sensor's depth bias."""
@@ -42,7 +42,7 @@ class Knowledge:
     """Whether that is the sensor's own noise and not `TYPICAL_NOISE`."""
     range: tuple[float, float]
     ovality: tuple[float, float] = (0.0, 0.0)
-    """How oval the silo is, as the calibration has it (`siloscope.surface`)."""
+    """How oval the silo is, as the calibration has it (`siloscope.estimation.surface`)."""
     assumed: tuple[str, ...] = ()
     config: dict[str, Any] = field(default_factory=dict)
 

@@ -18,7 +18,7 @@ from siloscope.content.quality import QUALITY, Remark
 from siloscope.content.result import Content, Level, Parts
 from siloscope.content.surface_map import Shape, SurfaceMap
 from siloscope.errors import InputError, UsageError
-from siloscope.frame import Frame
+from siloscope.types.frame import Frame
 
 FEWEST = 3
 """Fewer cells than this that seem to show content on an otherwise bare floor are no content."""

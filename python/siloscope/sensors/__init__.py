@@ -10,8 +10,8 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from siloscope.camera import Camera
 from siloscope.errors import InputError, UsageError
+from siloscope.types.camera import Camera
 
 __all__ = ["UNKNOWN", "SensorProfile", "load", "names"]
 
@@ -74,7 +74,7 @@ UNKNOWN = SensorProfile(
 
 @cache
 def _shipped(name: str) -> SensorProfile:
-    return _parse(resources.files(__name__).joinpath(f"{name}.toml").read_bytes(), name)
+    return _parse(resources.files(__name__).joinpath("profiles", f"{name}.toml").read_bytes(), name)
 
 
 def names() -> list[str]:
@@ -84,7 +84,7 @@ def names() -> list[str]:
 
 @cache
 def _names() -> tuple[str, ...]:
-    files = resources.files(__name__).iterdir()
+    files = resources.files(__name__).joinpath("profiles").iterdir()
     return tuple(sorted(file.name.removesuffix(".toml") for file in files if file.name.endswith(".toml")))
 
 

@@ -7,8 +7,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from siloscope import documents
 from siloscope.errors import UsageError
+from siloscope.schema import documents
 from siloscope.tracking.story import Track
 
 COLUMNS = (

@@ -1,0 +1,329 @@
+"""Method ``surface``: cylinder and cone fitted to the wall, with the sensor's error taken into account."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope import _core
+from siloscope.sensors import SensorProfile
+from siloscope.types.camera import Camera
+from siloscope.types.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.types.pose import SiloPose
+
+PARAMETERS = (
+    *("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "cone_intercept"),
+    *("offset", "scale", "quadratic", "oval_cos", "oval_sin"),
+)
+"""Order of the parameters: pose; radius; cone (its radius b − m·z: slope m, intercept b); depth bias; ovality."""
+
+OVALITY = PARAMETERS.index("oval_cos")
+
+DIAMETER_STD = 0.002
+"""Standard deviation of a tape-measured diameter, m."""
+
+GRAVITY_STD = 0.01
+"""Standard deviation of an accelerometer's direction at rest, rad (Table 7 of the paper: 5 to 12 mrad)."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceEvidence:
+    """What one frame says about all parameters, without priors: what `calibrate` fuses.
+
+    Vectors are (12,) in the order of `PARAMETERS`, matrices (12, 12). Near `parameters` the frame's negative
+    log-likelihood is ``gradient @ δ + δ @ information @ δ / 2``. What was known before the frame (sensor profile,
+    diameter, gravity) stands beside it, because it is common to all frames.
+    """
+
+    parameters: NDArray[np.float64]
+    """The answer with the silo's ovality estimated; NaN where a part was not seen."""
+    information: NDArray[np.float64]
+    """Information of this frame alone."""
+    gradient: NDArray[np.float64]
+    """Gradient of this frame's negative log-likelihood at `parameters`."""
+    scatter: NDArray[np.float64]
+    """Covariance of `gradient` as the residuals have it."""
+    noise: NDArray[np.float64]
+    """The part of `scatter` that the sensor's noise makes; the rest (the wall's own shape, the lens) may come back."""
+    free: NDArray[np.bool_]
+    """Which parameters were estimated."""
+    prior_mean: NDArray[np.float64]
+    """What was expected before; NaN where nothing was."""
+    prior_information: NDArray[np.float64]
+    """How firmly, as 1/variance; 0 where nothing was expected."""
+    scale_std: float
+    """Standard deviation of the depth scale where no frame can tell it, else 0."""
+    base: NDArray[np.float64]
+    """Where the frame's equations were made, near `parameters`; NaN where they are."""
+    rays: NDArray[np.float64]
+    """(K, 3): (x, y) of rays (x, y, 1) to some of the wall that was seen, and their information, 1/m². None where the
+    depth bias is known: the equations hold far enough."""
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceDetails:
+    """What pictures show of a fit.
+
+    `points` (N, 3): patches in the silo frame, m; `residuals` (N,): their distance from the wall, m, NaN where a patch
+    is not wall.
+    """
+
+    points: NDArray[np.float64]
+    residuals: NDArray[np.float64]
+    wall: Any = None
+    """Where the frame's patches show the wall, for other frames of the camera to start from: a tuple that only the core
+    reads. None for clouds."""
+    _labelled: Callable[[], NDArray[np.uint8]] | None = None
+
+    @cached_property
+    def labels(self) -> NDArray[np.uint8] | None:
+        """Label of each pixel (H, W): 0 none, 1 cylinder, 2 cone, 3 feed, 4 other. Worked out when asked for."""
+        return None if self._labelled is None else self._labelled()
+
+
+def fit_depth(
+    depth: NDArray[np.float32],
+    camera: Camera,
+    profile: SensorProfile,
+    *,
+    diameter: float | None = None,
+    diameter_std: float = DIAMETER_STD,
+    gravity: NDArray[np.float64] | None = None,
+    gravity_std: float = GRAVITY_STD,
+    start: Estimate | None = None,
+    ratios: bool = True,
+    config: dict[str, Any] | None = None,
+) -> Estimate:
+    """Fit the wall to a depth image.
+
+    Parameters
+    ----------
+    depth : float32 (H, W), C-contiguous
+        Measured depth z in metres; 0 or NaN where there is none.
+    camera : Camera
+        Intrinsics of the same size.
+    profile : SensorProfile
+        The sensor's depth error.
+    diameter, diameter_std : float, optional
+        Measured inner diameter of the silo's cylinder, m.
+    gravity : float (3,), optional
+        Direction of gravity in the camera frame, any length; used as a prior on the axis and reported against the
+        answer without it.
+    start : Estimate, optional
+        Of another frame of the same camera: the wall is looked for there before it is searched.
+    ratios : bool
+        Whether to work out how much of the frame is cylinder, cone and feed.
+    config : dict, optional
+        Effective settings to record in the estimate.
+    """
+    radius, pull = _priors(diameter, diameter_std, gravity, gravity_std)
+    wall = None if start is None or start.details is None else start.details.wall
+    frame = (depth, camera.rays(), profile.bias, profile.bias_std, profile.noise, radius, pull)
+    found = _core.surface_fit_image(*frame, wall=wall, ratios=ratios)
+    if "refusal" in found:
+        return refused("surface", found["refusal"], config or {})
+
+    def labelled() -> NDArray[np.uint8]:
+        labels: NDArray[np.uint8] = _core.surface_fit_image(*frame, labels=True, wall=wall)["labels"]
+        return labels
+
+    return _estimate(found, profile, config or {}, diameter, gravity, labelled)
+
+
+def fit_points(
+    points: NDArray[np.float64],
+    *,
+    grid: float | None = None,
+    diameter: float | None = None,
+    diameter_std: float = DIAMETER_STD,
+    gravity: NDArray[np.float64] | None = None,
+    gravity_std: float = GRAVITY_STD,
+    threads: int = 1,
+    config: dict[str, Any] | None = None,
+) -> Estimate:
+    """Fit the wall to a cloud, seen from inside or outside.
+
+    Parameters
+    ----------
+    points : float64 (N, 3)
+        Points in the camera frame, metres; rows that aren't finite are left out. They are taken as they are: without
+        rays, no depth bias can be told from them.
+    grid : float, optional
+        Side of the voxel grid's cells in metres; None for `cell_size`.
+
+    The rest is as for `fit_depth`.
+    """
+    radius, pull = _priors(diameter, diameter_std, gravity, gravity_std)
+    found = _core.surface_fit_cloud(points, grid or cell_size(points), radius, pull, threads)
+    if "refusal" in found:
+        return refused("surface", found["refusal"], config or {})
+    return _estimate(found, SensorProfile("none: a cloud is taken as it is"), config or {}, diameter, gravity)
+
+
+def cell_size(points: NDArray[np.float64]) -> float:
+    """Side of voxel cells for a cloud: the paper's 0.05 m, or a 60th of the cloud where it is small, in metres."""
+    finite = points[np.isfinite(points).all(axis=1)]
+    if len(finite) == 0:
+        return GRID
+    extent = float(np.max(np.percentile(finite, 95, axis=0) - np.percentile(finite, 5, axis=0)))
+    return min(GRID, extent / 60.0) if extent > 0.0 else GRID
+
+
+GRID = 0.05
+"""Side of the voxel grid's cells, m (step 1 of section 2.3)."""
+
+Prior = tuple[float, float] | None
+Pull = tuple[float, float, float, float] | None
+
+
+def _priors(
+    diameter: float | None, diameter_std: float, gravity: NDArray[np.float64] | None, gravity_std: float
+) -> tuple[Prior, Pull]:
+    """Radius and gravity with their standard deviations, as the core takes them."""
+    radius = None if diameter is None else (diameter / 2.0, diameter_std / 2.0)
+    if gravity is None:
+        return radius, None
+    return radius, (float(gravity[0]), float(gravity[1]), float(gravity[2]), gravity_std)
+
+
+def refused(method: str, slug: str, config: dict[str, Any]) -> Estimate:
+    """An estimate without an answer; the message says what the reason means and what to try."""
+    meaning, advice = reasons()[slug]
+    message = f"{meaning[0].upper()}{meaning[1:]}; {advice}."
+    return Estimate("refused", method, reason=slug, message=message, config=config)
+
+
+def reasons() -> dict[str, tuple[str, str]]:
+    """Every reason for a refusal: what it means, and what to try."""
+    return {slug: (meaning, advice) for slug, meaning, advice in _core.surface_refusals()}
+
+
+def _estimate(
+    found: dict[str, Any],
+    profile: SensorProfile,
+    config: dict[str, Any],
+    diameter: float | None,
+    gravity: NDArray[np.float64] | None,
+    labelled: Callable[[], NDArray[np.uint8]] | None = None,
+) -> Estimate:
+    pose = SiloPose(*found["pose"])
+    covariance = found["covariance"]
+    silo, silo_std = geometry(found["radius"], found["cone"], covariance)
+    extra = {"sensor": _sensor(found, profile), "fit": _quality(found)}
+    if gravity is not None:
+        extra["gravity"] = _gravity_check(pose, gravity)
+    return Estimate(
+        "ok",
+        "surface",
+        pose=pose,
+        covariance=covariance[:4, :4].copy(),
+        silo=silo,
+        silo_std=silo_std,
+        pixel_ratios=_ratios(found.get("pixel_counts")),
+        area_ratios=_ratios(found.get("areas")),
+        config=config,
+        timing_ms={name.replace(" ", "_"): ms for name, ms in found["timing"]},
+        extra=extra,
+        evidence=_evidence(found, profile, diameter, gravity),
+        details=SurfaceDetails(found["points"], found["residuals"], found["wall"], labelled),
+    )
+
+
+def geometry(
+    radius: float | None, cone: tuple[float, float] | None, covariance: NDArray[np.float64]
+) -> tuple[SiloGeometry, SiloGeometry]:
+    """Geometry and its standard deviations from radius R, cone slope m and intercept b; the cone has radius b − m·z."""
+    std = np.sqrt(np.diag(covariance))
+    r_std = None if radius is None else float(std[4])
+    if cone is None:
+        return SiloGeometry(radius=radius), SiloGeometry(radius=r_std)
+    slope, intercept = cone
+
+    def height(radius: float, by_radius: float) -> tuple[float, float]:
+        z = (intercept - radius) / slope
+        jacobian = np.array([by_radius, -z, 1.0]) / slope
+        return z, float(np.sqrt(jacobian @ covariance[4:7, 4:7] @ jacobian))
+
+    apex, apex_std = height(0.0, 0.0)
+    if radius is None:
+        return SiloGeometry(apex=apex), SiloGeometry(apex=apex_std)
+    bottom, bottom_std = height(radius, -1.0)
+    return SiloGeometry(radius, bottom, apex), SiloGeometry(r_std, bottom_std, apex_std)
+
+
+def _ratios(counts: Any) -> Ratios | None:
+    """Shares of cylinder, cone and feed among everything seen; None for clouds, whose points are no pixels."""
+    seen = 0.0 if counts is None else sum(counts[1:])
+    return Ratios(*(counts[k] / seen for k in (1, 2, 3))) if seen > 0 else None
+
+
+def _sensor(found: dict[str, Any], profile: SensorProfile) -> dict[str, Any]:
+    """The depth error that the answer rests on: given, or estimated with the pose."""
+    free = found["free"][7:10]
+    std = np.sqrt(np.diag(found["covariance"]))[7:10]
+    names = ("offset", "scale", "quadratic")
+    return {
+        "profile": profile.name,
+        "bias": dict(zip(names, found["bias"], strict=True)),
+        "bias_std": dict(zip(names, np.where(free, std, profile.bias_std).tolist(), strict=True)),
+        "bias_estimated": [n for n, f in zip(names, free, strict=True) if f],
+    }
+
+
+def _quality(found: dict[str, Any]) -> dict[str, Any]:
+    evidence = found["evidence"]
+    return {
+        "wall_patches": evidence["patches"],
+        "chi_square": found["chi_square"],
+        "misfit": found["misfit"],
+        "cone_slope": None if found["cone"] is None else found["cone"][0],
+        "ovality": float(np.hypot(*found["ovality"])) if any(found["free"][10:]) else None,
+        "seen_from": "inside" if found["inside"] else "outside",
+        "arc": evidence["arc"],
+        "turn": evidence["turn"],
+        "bend": evidence["bend"],
+    }
+
+
+def _gravity_check(pose: SiloPose, gravity: NDArray[np.float64]) -> dict[str, float]:
+    """The accelerometer's own angles beside the answer's (Table 7)."""
+    from_gravity = SiloPose.from_axis(gravity, np.zeros(3))
+    down = np.asarray(gravity, float) / np.linalg.norm(gravity)
+    angle = float(np.arccos(np.clip(abs(down @ pose.axis_direction), 0.0, 1.0)))  # both are lines
+    return {"r_x": from_gravity.r_x, "r_y": from_gravity.r_y, "angle_to_axis": angle}
+
+
+def _evidence(
+    found: dict[str, Any], profile: SensorProfile, diameter: float | None, gravity: NDArray[np.float64] | None
+) -> SurfaceEvidence:
+    slope, intercept = found["cone"] or (np.nan, np.nan)
+    radius = np.nan if found["radius"] is None else found["radius"]
+    prior = found["prior"]
+    free = np.array(found["free"]) | (np.arange(len(PARAMETERS)) >= OVALITY) & (prior > 0.0)
+    expected = np.full(len(PARAMETERS), np.nan)
+    expected[7:10] = profile.bias
+    expected[OVALITY:] = 0.0
+    if diameter is not None:
+        expected[4] = diameter / 2.0
+    if gravity is not None:
+        tilt = SiloPose.from_axis(gravity, np.zeros(3))
+        expected[:2] = tilt.r_x, tilt.r_y
+    return SurfaceEvidence(
+        parameters=np.array([*found["pose"], radius, slope, intercept, *found["bias"], *found["ovality"]])
+        + found["step"],
+        information=found["information"],
+        gradient=found["gradient"],
+        scatter=found["scatter"],
+        noise=found["noise_share"],
+        free=free,
+        prior_mean=expected,
+        prior_information=prior,
+        scale_std=0.0 if free[8] else profile.bias_std[1],
+        base=found["base"],
+        rays=found["rays"],
+    )

@@ -1,0 +1,192 @@
+"""Has the camera moved? A robust change-point test on a sequence of frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope.fusion.solve import BIAS, FAR, RADIUS, SCALE, SIZE, Fused, Stack, Sums, deviation, fuse, majority, sums
+
+SHORTEST = 3
+"""A move needs this many agreeing frames on both sides; fewer are bad frames."""
+
+SIGNIFICANT = 50.0
+"""Least squared distance between the poses before and after, for 4 degrees of freedom (chance: 4e-10)."""
+
+SMALLEST_TURN = 5e-4
+"""Turns below this are not worth telling, rad."""
+
+SMALLEST_SHIFT = 1e-3
+"""Shifts below this are not worth telling, m."""
+
+FEW_STARTS = 4
+"""Starts of the robust fits while looking for the place."""
+
+GRID = 16
+"""Places tried at a time."""
+
+MOVING = (0, 1, 2, 3, 6, 10, 11)
+"""Parameters that a move changes: the pose, the cone's intercept, which is counted from the camera's height, and the
+ovality's azimuth, which is counted from the camera."""
+
+STAYING = (4, 5, 7, 8, 9)
+"""Parameters that it does not: radius, cone slope, depth bias."""
+
+
+@dataclass(frozen=True)
+class Move:
+    """A move of the camera before frame `index` of the sequence: by how much, and how sure that is."""
+
+    index: int
+    turn: float
+    """Angle between the axis directions before and after, rad (r_x and r_y together)."""
+    shift: float
+    """Change of (t_x, t_y), m."""
+    significance: float
+    """Squared distance between the poses in units of its covariance."""
+
+
+def find_moves(stack: Stack, earlier: Sums | None = None, first: int = 0) -> list[Move]:
+    """All moves in the sequence, in order; `earlier` frames stand before it."""
+    known = 0 if earlier is None else earlier.frames
+    if stack.count < SHORTEST or known + stack.count < 2 * SHORTEST:
+        return []
+    split = _best_split(stack, earlier)
+    move = None if split is None else _judged(stack, earlier, split, first)
+    if move is None:
+        return []
+    place = move.index - first
+    before, after = stack.take(slice(0, place)), stack.take(slice(place, None))
+    return [*find_moves(before, earlier, first), move, *find_moves(after, None, move.index)]
+
+
+def may_have_moved(fused: Fused) -> bool:
+    """Whether as many frames as a move needs were left out one after the other."""
+    left_out = fused.weights < 0.5
+    return any(left_out[first : first + SHORTEST].all() for first in range(len(left_out) - SHORTEST + 1))
+
+
+def _best_split(stack: Stack, earlier: Sums | None) -> int | None:
+    """Where cutting the sequence in two leaves the smallest robust misfit; coarse to fine."""
+    least = SHORTEST if earlier is None or earlier.frames < SHORTEST else 0
+    low, high = least, stack.count - SHORTEST
+    if high < low:
+        return None
+    while True:
+        places = np.unique(np.linspace(low, high, GRID).round().astype(int))
+        costs = _misfits(stack, places, True, earlier) + _misfits(stack, places, False, None)
+        best = int(places[costs.argmin()])
+        step = int(np.diff(places).max()) if len(places) > 1 else 1
+        if step <= 1:
+            return best
+        low, high = max(least, best - step), min(stack.count - SHORTEST, best + step)
+
+
+def _misfits(stack: Stack, places: NDArray[np.int_], before: bool, base: Sums | None) -> NDArray[np.float64]:
+    """Robust misfit of the frames before or after each place about their own answer."""
+    first = np.zeros_like(places) if before else places
+    last = places if before else np.full_like(places, stack.count)
+    number = np.arange(stack.count)
+    members = (number >= first[:, None]) & (number < last[:, None])
+    starts = np.linspace(first, np.maximum(last - 1, first), FEW_STARTS, axis=1).round().astype(np.intp)
+    centres = majority(stack, members, np.minimum(starts, stack.count - 1), base or Sums.nothing())
+    off = np.clip(deviation(stack.distances(centres), stack.dof), 0.0, FAR)
+    misfits: NDArray[np.float64] = np.where(members, off**2, 0.0).sum(axis=1)
+    return misfits
+
+
+def _judged(stack: Stack, earlier: Sums | None, split: int, first: int) -> Move | None:
+    """The move at a place, if both sides agree within themselves and not with each other."""
+    before, after = stack.take(slice(0, split)), stack.take(slice(split, None))
+    sides = [fuse(before, earlier) if before.count else None, fuse(after)]
+    counts = [_agreeing(sides[0], earlier), _agreeing(sides[1], None)]
+    if min(counts) < SHORTEST:
+        return None
+    totals = [_side(before, sides[0], earlier), _side(after, sides[1], None)]
+    step, distance = _contrast(totals, max(side.excess for side in sides if side is not None))
+    turn, shift = float(np.hypot(*step[:2])), float(np.hypot(*step[2:4]))
+    worth = turn > SMALLEST_TURN or shift > SMALLEST_SHIFT
+    index = first + _placed(stack, split, sides)
+    return Move(index, turn, shift, distance) if worth and distance > SIGNIFICANT else None
+
+
+def _placed(stack: Stack, split: int, sides: list[Fused | None]) -> int:
+    """The place, with bad frames beside it on the side whose pose is nearer: they cost the same on both."""
+    before, after = sides
+    if before is None or after is None:
+        return split
+    bad = np.concatenate([before.weights, after.weights]) < 0.5
+    poses = np.where(np.arange(SIZE) < RADIUS, [before.parameters, after.parameters], np.nan)
+    to_before, to_after = stack.distances(poses)
+    while split > 0 and bad[split - 1] and to_after[split - 1] < to_before[split - 1]:
+        split -= 1
+    while split < stack.count and bad[split] and to_before[split] < to_after[split]:
+        split += 1
+    return split
+
+
+def _agreeing(side: Fused | None, earlier: Sums | None) -> int:
+    known = 0 if earlier is None else earlier.frames
+    return known + (0 if side is None else int((side.weights > 0.5).sum()))
+
+
+def _side(part: Stack, fused: Fused | None, base: Sums | None) -> Sums:
+    if fused is None:
+        return base or Sums.nothing()
+    return sums(part, fused.weights, fused.parameters, base)
+
+
+def _contrast(sides: list[Sums], excess: float) -> tuple[NDArray[np.float64], float]:
+    """Step of the pose between two sides (4,), and its squared distance from none.
+
+    Both sides share radius, cone slope, depth bias and the priors on them: only the pose, and the cone seen from it,
+    may differ. So what all frames have in common does not blur the comparison.
+    """
+    origin = sides[0].origin
+    places = [_place(number) for number in range(2)]
+    system, spread = np.zeros((_SIZE, _SIZE)), np.zeros((_SIZE, _SIZE))
+    pull, held, wanted = np.zeros(_SIZE), np.zeros(_SIZE), np.zeros(_SIZE)
+    for side, place in zip(sides, places, strict=True):
+        system += place.T @ side.information @ place
+        spread += place.T @ (excess * (side.noise + side.weight * side.shared)) @ place
+        pull += place.T @ (side.pull + side.information @ (side.origin - origin))
+        prior = np.where(_SHARED_PRIOR, side.prior_information, 0.0) @ place
+        wanted = np.where(prior > held, (side.prior_mean - origin) @ place, wanted)
+        held = np.maximum(held, prior)
+    pinned = (np.concatenate([MOVING, MOVING, STAYING]) >= BIAS) & (held == 0.0)
+    pinned[-len(STAYING) + STAYING.index(SCALE)] |= held[2 * len(MOVING)] == 0.0  # no radius, no scale
+    system, spread = system + np.diag(held), spread + np.diag(held)
+    system[pinned] = system[:, pinned] = spread[pinned] = spread[:, pinned] = 0.0
+    return _stepped(system, spread, np.where(pinned, 0.0, pull + held * wanted))
+
+
+_SIZE = 2 * len(MOVING) + len(STAYING)
+
+_SHARED_PRIOR = np.arange(SIZE) >= RADIUS
+"""Gravity is a prior on the pose of its own time, and so none on a step of it."""
+
+
+def _place(side: int) -> NDArray[np.float64]:
+    """Which columns of the two sides' common equations a side's parameters are."""
+    place = np.zeros((SIZE, _SIZE))
+    place[MOVING, np.arange(len(MOVING)) + side * len(MOVING)] = 1.0
+    place[STAYING, np.arange(2 * len(MOVING), _SIZE)] = 1.0
+    return place
+
+
+def _stepped(
+    system: NDArray[np.float64], spread: NDArray[np.float64], pull: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], float]:
+    scale = np.sqrt(np.diag(system))
+    scale[scale == 0.0] = 1.0
+    inverse = np.linalg.pinv(system / scale[:, None] / scale[None, :], rcond=1e-12, hermitian=True)
+    inverse = inverse / scale[:, None] / scale[None, :]
+    difference = np.zeros((4, len(system)))
+    difference[:, :4] = -np.eye(4)
+    difference[:, len(MOVING) : len(MOVING) + 4] = np.eye(4)
+    reading = difference @ inverse
+    step = reading @ pull
+    covariance = reading @ spread @ reading.T
+    return step, float(step @ np.linalg.solve(covariance, step))

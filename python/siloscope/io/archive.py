@@ -1,0 +1,358 @@
+"""An archive of many depth frames: a Zarr v3 folder, one compressed and checked chunk a frame.
+
+Any Zarr reader opens it: array ``depth`` (frame, row, column), ``timestamp`` (frame) and ``gravity`` (frame, 3);
+camera, depth unit and provenance are the group's attributes. Files are written beside their place and then renamed,
+and the array's length last, so an interruption at any moment leaves the frames before it readable.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import struct
+from collections.abc import Iterable, Iterator
+from functools import partial
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope import _core
+from siloscope.errors import InputError
+from siloscope.io.source import Format, FrameSource, Item, Options, check_image_size
+from siloscope.types.camera import Camera
+from siloscope.types.frame import Frame
+
+SCHEMA = "siloscope.archive/1"
+_GROUP = "zarr.json"
+_LARGEST_METADATA = 1 << 20
+_ROWS = 1024
+"""Frames a chunk of the small arrays."""
+_DTYPES = ("uint16", "float32", "float64")
+_CHECKSUM = {"name": "crc32c"}
+_BYTES = {"name": "bytes", "configuration": {"endian": "little"}}
+
+
+# With the bytes of the pixels sorted by weight, LZ4 HC packs like Zstandard and unpacks twice as fast.
+def _blosc(itemsize: int) -> dict[str, Any]:
+    setting = {"cname": "lz4hc", "clevel": 5, "shuffle": "shuffle", "typesize": itemsize, "blocksize": 0}
+    return {"name": "blosc", "configuration": setting}
+
+
+def _array(shape: list[int], chunk: list[int], dtype: str, names: list[str], **more: Any) -> dict[str, Any]:
+    """The ``zarr.json`` of an array; chunks lie flat in its folder as ``c.0.0.0``."""
+    compressor = [_blosc(np.dtype(dtype).itemsize)] if "attributes" in more else []
+    return {
+        "zarr_format": 3,
+        "node_type": "array",
+        "shape": shape,
+        "data_type": dtype,
+        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
+        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
+        "fill_value": 0 if dtype == "uint16" else "NaN",
+        "codecs": [_BYTES, *compressor, _CHECKSUM],
+        "dimension_names": names,
+        "attributes": {},
+        **more,
+    }
+
+
+class Writer:
+    """Writes an archive, or goes on with one; use it in a ``with`` statement.
+
+    Parameters
+    ----------
+    path : path
+        The archive's folder; new, empty, or an archive of the same camera, image size and unit.
+
+    Raises
+    ------
+    InputError
+        Where the path is something else.
+    """
+
+    def __init__(self, path: str | os.PathLike[str]) -> None:
+        self.path = Path(path)
+        self.count = 0
+        self._head: dict[str, Any] | None = None
+        self._times = np.full(_ROWS, np.nan)
+        self._gravities = np.full((_ROWS, 3), np.nan)
+        if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
+            self._go_on()
+
+    def _go_on(self) -> None:
+        existing = ArchiveSource(self.path, Options())
+        if existing.missing:
+            raise InputError(f"{existing.problems[0]}; convert what is left into a new archive")
+        self._head, self.count = existing.head, existing.declared
+        start = self.count - self.count % _ROWS
+        self._times[: self.count - start] = existing.times[start:]
+        self._gravities[: self.count - start] = existing.gravities[start:]
+
+    def append(self, frame: Frame) -> None:
+        """Adds a depth frame; raises `InputError` for points, or a frame unlike those before."""
+        depth = frame.depth
+        if depth is None or depth.dtype.name not in _DTYPES:
+            kind = "points" if depth is None else f"{depth.dtype} depth"
+            raise InputError(f"{frame.source}: an archive holds depth images (uint16 or floating point), not {kind}")
+        head = _head_of(frame, depth)
+        if self._head is None:
+            self._begin(head, frame)
+        self._check_alike(head, frame)
+        self._write_frame(frame, depth)
+        self.count += 1
+        self._write_lengths(depth)
+
+    def _begin(self, head: dict[str, Any], frame: Frame) -> None:
+        for name in ("depth", "timestamp", "gravity"):
+            (self.path / name).mkdir(parents=True, exist_ok=True)
+        self._head = head
+        self._write_lengths(np.empty((head["height"], head["width"]), head["dtype"]))
+        attributes = {**head, "provenance": {k: v for k, v in frame.provenance.items() if k != "frame"}}
+        group = {"zarr_format": 3, "node_type": "group", "attributes": attributes}
+        _replace(self.path / _GROUP, _json(group))
+
+    def _check_alike(self, head: dict[str, Any], frame: Frame) -> None:
+        assert self._head is not None
+        for key, value in head.items():
+            if self._head.get(key) != value:
+                raise InputError(
+                    f"{frame.source}: its {key.replace('_', ' ')} is {value}, that of {self.path} is "
+                    f"{self._head.get(key)}; an archive holds frames of one camera, write another one"
+                )
+
+    def _write_frame(self, frame: Frame, depth: NDArray[Any]) -> None:
+        row = self.count % _ROWS
+        if row == 0:
+            self._times[:], self._gravities[:] = np.nan, np.nan
+        self._times[row] = math.nan if frame.timestamp is None else frame.timestamp
+        self._gravities[row] = np.nan if frame.gravity is None else frame.gravity
+        chunk = self.count // _ROWS
+        _replace(self.path / "depth" / f"c.{self.count}.0.0", _checked(_compress(depth)))
+        _replace(self.path / "timestamp" / f"c.{chunk}", _checked(self._times.astype("<f8").tobytes()))
+        _replace(self.path / "gravity" / f"c.{chunk}.0", _checked(self._gravities.astype("<f8").tobytes()))
+
+    def _write_lengths(self, depth: NDArray[Any]) -> None:
+        """The arrays' descriptions; that of the depth last, for it says how many frames there are."""
+        height, width = depth.shape
+        unit = (self._head or {}).get("depth_unit")
+        # xarray and GDAL make metres of these.
+        attributes = {"units": "m", "scale_factor": unit if unit is not None else 1.0}
+        arrays = {
+            "timestamp": _array([self.count], [_ROWS], "float64", ["frame"]),
+            "gravity": _array([self.count, 3], [_ROWS, 3], "float64", ["frame", "axis"]),
+            "depth": _array(
+                [self.count, height, width],
+                [1, height, width],
+                depth.dtype.name,
+                ["frame", "row", "column"],
+                attributes=attributes,
+            ),
+        }
+        for name, array in arrays.items():
+            _replace(self.path / name / _GROUP, _json(array))
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Every frame is complete when `append` returns; nothing is left to do."""
+
+
+def write(path: str | os.PathLike[str], frames: Iterable[Frame]) -> int:
+    """Writes frames to an archive, or adds them to it; gives their number."""
+    with Writer(path) as archive:
+        before = archive.count
+        for frame in frames:
+            archive.append(frame)
+        return archive.count - before
+
+
+def _head_of(frame: Frame, depth: NDArray[Any]) -> dict[str, Any]:
+    """What all frames of an archive have in common."""
+    height, width = depth.shape
+    raw = depth.dtype == np.uint16
+    return {
+        "schema": SCHEMA,
+        "camera": frame.camera.to_dict() if frame.camera else None,
+        "depth_unit": frame.depth_unit if raw else None,
+        "dtype": depth.dtype.name,
+        "height": height,
+        "width": width,
+    }
+
+
+def _json(document: dict[str, Any]) -> bytes:
+    return json.dumps(document, indent=1, default=str).encode()
+
+
+def _replace(path: Path, data: bytes) -> None:
+    """Writes a whole file or nothing."""
+    beside = path.with_name(f".{path.name}.new")
+    beside.write_bytes(data)
+    beside.replace(path)
+
+
+def _checked(data: bytes) -> bytes:
+    return data + struct.pack("<I", _core.checksum(data))
+
+
+def _unchecked(data: bytes) -> bytes:
+    if len(data) < 4 or struct.unpack("<I", data[-4:])[0] != _core.checksum(data[:-4]):
+        raise InputError("its chunk fails the checksum; the file is damaged")
+    return data[:-4]
+
+
+def _compress(depth: NDArray[Any]) -> bytes:
+    from numcodecs.blosc import Blosc
+
+    packed: bytes = Blosc("lz4hc", 5, Blosc.SHUFFLE).encode(np.ascontiguousarray(depth))
+    return packed
+
+
+def _decompress(data: bytes, shape: tuple[int, int], dtype: str) -> NDArray[Any]:
+    from numcodecs.blosc import Blosc
+
+    size = shape[0] * shape[1] * np.dtype(dtype).itemsize
+    told, _, stored = struct.unpack_from("<III", data, 4) if len(data) >= 16 else (0, 0, 0)
+    if (told, stored) != (size, len(data)):
+        raise InputError(f"its chunk is declared {told} bytes large, not {size}; the file is damaged")
+    depth = np.empty(shape, dtype)
+    try:
+        Blosc().decode(data, depth)
+    except (RuntimeError, ValueError) as error:
+        raise InputError(f"its chunk is damaged ({error})") from None
+    return depth
+
+
+class ArchiveSource(FrameSource):
+    """The frames of an archive."""
+
+    def __init__(self, path: Path, options: Options) -> None:
+        super().__init__(path, "archive", options)
+        self.head = self._attributes()
+        self.dtype, self.shape, self.declared = self._depth_array()
+        self.numbers = self._numbers()
+        self.missing = self.declared - len(self.numbers)
+        self.times = self._rows("timestamp", 1)[:, 0]
+        self.gravities = self._rows("gravity", 3)
+        known = self.times[self.numbers]
+        self.timestamps = known.tolist() if np.all(np.isfinite(known)) else None
+        self.file_depth_unit = _unit(self.head.get("depth_unit"))
+        self.file_camera = self._camera()
+        self.provenance |= self._provenance()
+        self.problems = [self._loss()] if self.missing else []
+
+    def _read_json(self, path: Path) -> dict[str, Any]:
+        try:
+            if path.stat().st_size > _LARGEST_METADATA:
+                raise InputError(f"{path}: too long for a Zarr description; the archive is damaged")
+            document = json.loads(path.read_bytes())
+        except (OSError, ValueError, RecursionError) as error:
+            raise InputError(f"{path}: can't be read ({error}); the archive is damaged") from None
+        if not isinstance(document, dict) or document.get("zarr_format") != 3:
+            raise InputError(f"{path}: not a Zarr v3 description; the archive is damaged")
+        return document
+
+    def _attributes(self) -> dict[str, Any]:
+        attributes = self._read_json(self.path / _GROUP).get("attributes")
+        schema = attributes.get("schema") if isinstance(attributes, dict) else None
+        if schema != SCHEMA:
+            raise InputError(
+                f"{self.name}: a Zarr folder, but no archive of depth frames ({schema!r} instead of '{SCHEMA}'); "
+                "make one with `siloscope convert`"
+            )
+        return dict(attributes or {})
+
+    def _depth_array(self) -> tuple[str, tuple[int, int], int]:
+        array = self._read_json(self.path / "depth" / _GROUP)
+        shape, dtype = array.get("shape"), array.get("data_type")
+        codecs = array.get("codecs")
+        names = [codec.get("name") for codec in codecs if isinstance(codec, dict)] if isinstance(codecs, list) else []
+        whole = isinstance(shape, list) and len(shape) == 3 and all(type(n) is int and n >= 0 for n in shape)
+        if not whole or dtype not in _DTYPES or names != ["bytes", "blosc", "crc32c"]:
+            raise InputError(f"{self.name}: its depth array is not as siloscope writes it; convert the frames again")
+        assert isinstance(shape, list)
+        check_image_size(self.name, shape[2], shape[1])
+        return str(dtype), (shape[1], shape[2]), shape[0]
+
+    def _numbers(self) -> list[int]:
+        """Numbers of the frames that are there, in order."""
+        with os.scandir(self.path / "depth") as files:
+            names = [file.name.split(".") for file in files if file.name.startswith("c.")]
+        found = {int(parts[1]) for parts in names if len(parts) == 4 and parts[1].isdecimal() and len(parts[1]) < 10}
+        return sorted(number for number in found if number < self.declared)
+
+    def _rows(self, name: str, width: int) -> NDArray[np.float64]:
+        """The values of a small array up to the last frame there is; NaN where they are missing or damaged."""
+        last = self.numbers[-1] + 1 if self.numbers else 0
+        rows = np.full((-(-last // _ROWS) * _ROWS, width), np.nan)
+        for chunk in range(len(rows) // _ROWS):
+            path = self.path / name / (f"c.{chunk}" if width == 1 else f"c.{chunk}.0")
+            try:
+                data = _unchecked(path.read_bytes())
+            except (OSError, InputError):
+                continue
+            if len(data) == _ROWS * width * 8:
+                rows[chunk * _ROWS : (chunk + 1) * _ROWS] = np.frombuffer(data, "<f8").reshape(-1, width)
+        return rows[:last]
+
+    def _camera(self) -> Camera | None:
+        fields = self.head.get("camera")
+        if fields is None or self.options.cameras:
+            return None
+        try:
+            return Camera(**fields)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"{self.name}: its camera can't be used ({error}); give --camera FILE") from None
+
+    def _provenance(self) -> dict[str, Any]:
+        """What the archive keeps of its frames' origin, beside where it lies itself."""
+        kept = self.head.get("provenance")
+        kept = kept if isinstance(kept, dict) else {}
+        return {**kept, **self.provenance, "archived_from": kept.get("file")}
+
+    def _items(self) -> Iterator[Item]:
+        for number in self.numbers:
+            yield Item(f"frame {number}", partial(self._decode, number))
+        if self.missing:
+            raise InputError(self._loss())
+
+    def _loss(self) -> str:
+        return f"{self.name}: {self.missing} of {self.missing + len(self.numbers)} frames are missing"
+
+    def _decode(self, number: int) -> Frame:
+        path = self.path / "depth" / f"c.{number}.0.0"
+        try:
+            data = path.read_bytes()
+        except OSError as error:
+            raise InputError(f"frame {number}: {path} can't be read ({error.strerror})") from None
+        depth = _decompress(_unchecked(data), self.shape, self.dtype)
+        time, gravity = float(self.times[number]), self.gravities[number]
+        return Frame(
+            depth=depth,
+            timestamp=time if math.isfinite(time) else None,
+            gravity=gravity if np.all(np.isfinite(gravity)) else None,
+        )
+
+    def _count(self) -> int:
+        return len(self.numbers)
+
+    def _streams(self) -> list[dict[str, Any]]:
+        size = self.shape[1], self.shape[0]
+        stream = {"name": "depth", "kind": "depth", "size": size, "dtype": self.dtype}
+        return [{**stream, "frames": len(self.numbers), "chosen": True}]
+
+
+def _unit(value: Any) -> float | None:
+    if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value) and 0 < value <= 1:
+        return float(value)
+    return None
+
+
+FORMAT = Format("archive", lambda head, path: path.is_dir() and (path / _GROUP).is_file(), ArchiveSource)

@@ -1,0 +1,1 @@
+"""Depth and points as arrays of NumPy."""

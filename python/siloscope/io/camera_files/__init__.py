@@ -1,0 +1,103 @@
+"""Camera files: intrinsics as JSON (ours, Open3D's, librealsense's), TOML, ROS ``camera_info`` YAML, or the text of
+``rs-enumerate-devices -c``. The content decides which, not the name.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import tomllib
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from siloscope.errors import InputError
+from siloscope.io.camera_files.distortion import DISTORTION_NAMES, distortion_model
+from siloscope.io.camera_files.enumeration import from_enumeration
+from siloscope.io.camera_files.fields import CameraFile, camera, from_fields, from_matrix
+from siloscope.io.camera_files.writing import dump
+from siloscope.types.camera import Camera
+
+__all__ = [
+    "DISTORTION_NAMES",
+    "CameraFile",
+    "camera",
+    "distortion_model",
+    "dump",
+    "from_matrix",
+    "load",
+    "parse",
+    "parse_json",
+    "read",
+]
+
+LARGEST_FILE = 1 << 20
+"""Bytes; no camera file is longer."""
+
+
+def load(path: str | PathLike[str], size: tuple[int, int] | None = None) -> Camera:
+    """The camera of a file; `size` (width, height) chooses where it lists several. Raises `InputError`."""
+    cameras = read(path).cameras
+    fitting = [camera for camera in cameras if size in (None, (camera.width, camera.height))]
+    if len(fitting) == 1:
+        return fitting[0]
+    known = ", ".join(f"{camera.width} x {camera.height}" for camera in cameras)
+    wanted = "which is meant" if size is None else f"none or several are {size[0]} x {size[1]}"
+    raise InputError(f"{path}: has cameras of {known}; {wanted}; keep the one of your depth stream in the file")
+
+
+def read(path: str | PathLike[str]) -> CameraFile:
+    """All that a camera file says; raises `InputError` naming the file and the field."""
+    return parse(str(path), _text(Path(path)))
+
+
+def parse(name: str, text: str) -> CameraFile:
+    """Reads the text of a camera file in any of the formats; `name` is for messages."""
+    if text.lstrip().startswith("{"):
+        return parse_json(name, text)
+    if re.search(r'^\s*Intrinsic of "', text, re.MULTILINE):
+        return CameraFile(from_enumeration(name, text))
+    return from_fields(name, _toml_or_yaml(name, text))
+
+
+def parse_json(name: str, text: str) -> CameraFile:
+    """Reads the text of a JSON camera file."""
+    try:
+        fields = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{name}: not valid JSON ({error}); check the camera file") from None
+    return from_fields(name, fields)
+
+
+def _text(path: Path) -> str:
+    try:
+        if not path.is_file():
+            raise InputError(f"{path}: no such camera file; check the path")
+        with path.open("rb") as file:
+            data = file.read(LARGEST_FILE + 1)
+    except OSError as error:
+        raise InputError(f"{path}: can't be read ({error.strerror}); check the path and its permissions") from None
+    if len(data) > LARGEST_FILE or not data.strip():
+        cause = "is empty" if not data.strip() else "is too long for a camera file"
+        raise InputError(f"{path}: {cause}; give a file with the intrinsics of the depth camera")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        raise InputError(f"{path}: is not text; give the intrinsics as JSON, TOML or ROS camera_info YAML") from None
+
+
+def _toml_or_yaml(name: str, text: str) -> Any:
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, RecursionError):
+        pass
+    import yaml
+
+    try:
+        return next(iter(yaml.safe_load_all(text)), None)
+    except (yaml.YAMLError, ValueError, TypeError, RecursionError) as error:
+        cause = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InputError(
+            f"{name}: neither JSON, TOML, ROS camera_info YAML nor rs-enumerate-devices text ({cause}); "
+            "give the intrinsics in one of these"
+        ) from None

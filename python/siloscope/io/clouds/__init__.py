@@ -1,0 +1,1 @@
+"""Point clouds, one module a format."""

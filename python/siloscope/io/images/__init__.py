@@ -1,0 +1,1 @@
+"""Depth images, one module a format."""

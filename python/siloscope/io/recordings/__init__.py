@@ -1,0 +1,1 @@
+"""Recordings of depth cameras: containers, and what the vendors put into them."""

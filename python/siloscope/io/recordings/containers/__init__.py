@@ -1,0 +1,1 @@
+"""Containers of recordings, one module each."""

@@ -1,0 +1,1 @@
+"""What recordings mean, one module for everyone who writes them."""

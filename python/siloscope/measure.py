@@ -1,0 +1,201 @@
+"""`measure`: one frame and a calibration in, the content out."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from siloscope import _core, sensors
+from siloscope.calibrate import calibrate
+from siloscope.content.capacity import LONGEST, Datasheet, Strapping
+from siloscope.content.density import Density, choose
+from siloscope.content.knowledge import WALL_STD, Knowledge, know, narrowed
+from siloscope.content.reading import Request, content_of, lengths_for_core, source_of
+from siloscope.content.result import Content
+from siloscope.errors import InputError, UsageError
+from siloscope.estimation.inputs import Prepared, prepare
+from siloscope.locate import locate
+from siloscope.sensors import SensorProfile
+from siloscope.types.calibration import Calibration
+from siloscope.types.camera import Camera
+from siloscope.types.frame import Frame
+
+BEHIND = 1.5
+"""Cells behind the farthest one that shows the bare cone at which a cone without an end is cut off."""
+
+
+def measure(
+    data: Frame | ArrayLike,
+    calibration: Calibration | str | PathLike[str] | None = None,
+    camera: Camera | None = None,
+    *,
+    sensor: str | Path | SensorProfile | None = None,
+    depth_unit: float | None = None,
+    diameter: float | None = None,
+    cylinder: float | None = None,
+    cone: float | None = None,
+    top: float | None = None,
+    outlet_diameter: float = 0.0,
+    outlet_length: float = 0.0,
+    strapping: Strapping | str | Path | None = None,
+    density: float | None = None,
+    density_std: float | None = None,
+    product: str | Path | Density | None = None,
+    mask: ArrayLike | None = None,
+    previous: Content | None = None,
+) -> Content:
+    """Measure what is in the silo: surface, level, volume, fill and mass, each with its standard deviation.
+
+    The surface is the most probable one under the returns that lie over the silo's floor (`docs/content.md` has the
+    formulas); the volume is the integral between it and the floor.
+
+    Parameters
+    ----------
+    data : Frame, or array
+        As for `siloscope.locate`.
+    calibration : Calibration or path, optional
+        Pose and geometry. Without one the frame itself has to show them: it is located first, and `assumed` says so.
+    camera : Camera, optional
+        Intrinsics; wins over the frame's own, and those over the calibration's.
+    sensor : str, path or SensorProfile, optional
+        Sensor profile; the calibration's where not given.
+    depth_unit : float, optional
+        Metres per raw unit of integer depth.
+    diameter, cylinder, cone : float, optional
+        Inner lengths of a datasheet, m: diameter, height of the cylinder, height of the cone. They fill in what the
+        calibration has not seen and tell the silo's upper edge. Without a calibration, the diameter also fixes the
+        depth's scale.
+    top : float, optional
+        z of the silo's upper edge below the camera, m (negative above it), up to which it can be filled. From
+        `cylinder` where not given, else the camera's own height.
+    outlet_diameter, outlet_length : float
+        Outlet pipe below the cone, m; counts as part of the silo.
+    strapping : Strapping or path, optional
+        Strapping table: capacity, and the volume below the mean level.
+    density, density_std : float, optional
+        Bulk density and its standard deviation, kg/m³.
+    product : str, path or Density, optional
+        A product of the table (`siloscope.content.products()`) or of a TOML file.
+    mask : array of bool, optional
+        True where the silo is.
+    previous : Content, optional
+        The reading of the frame before, to see whether the content is moving.
+
+    Raises
+    ------
+    InputError
+        For a frame or file that can't be used.
+    UsageError
+        For settings that can't be.
+    """
+    start = time.perf_counter()
+    chosen = choose(density, density_std, product)
+    if top is not None and not abs(top) <= LONGEST:
+        raise UsageError(f"top must be between -{LONGEST:g} and {LONGEST:g} m, got {top}")
+    sheet = Datasheet(diameter, cylinder, cone, outlet_diameter, outlet_length)
+    table = strapping if isinstance(strapping, Strapping | None) else Strapping.read(strapping)
+    profile = None if sensor is None else sensors.load(sensor)
+    known, located = _known(data, calibration, camera, profile, depth_unit, sheet, top, mask)
+    if isinstance(known, Content):
+        return known
+    prepared = prepare(data, _camera(data, camera, located), profile or sensors.UNKNOWN,
+                       depth_unit=depth_unit, mask=mask)  # fmt: skip
+    ready = time.perf_counter()
+    if known.lengths.cone_only:
+        known = _closer(prepared, known, sheet, located)
+    found, surface = _run(prepared, known, sheet)
+    done = time.perf_counter()
+    request = Request(data, known, sheet, table, chosen, previous, calibration is None)
+    times = {"prepare": 1e3 * (ready - start), "measure": 1e3 * (done - ready)}
+    return content_of(request, found, surface, {**prepared.config, **known.config}, times)
+
+
+def _known(
+    data: Frame | ArrayLike,
+    calibration: Calibration | str | PathLike[str] | None,
+    camera: Camera | None,
+    profile: SensorProfile | None,
+    depth_unit: float | None,
+    sheet: Datasheet,
+    top: float | None,
+    mask: ArrayLike | None,
+) -> tuple[Knowledge | Content, Calibration]:
+    """Pose and silo: from the calibration, or from the frame itself."""
+    if calibration is not None:
+        given = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
+        return know(given, profile, sheet, top, sheet.diameter), given
+    estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask)
+    if not estimate.ok:
+        reason, message = estimate.reason, f"{estimate.message} A calibration (--calibration) would do without."
+        return Content("refused", reason, message, source=source_of(data), config=estimate.config), Calibration(
+            "refused"
+        )
+    fused = calibrate([estimate], sensor=profile, diameter=sheet.diameter)
+    known = know(fused, profile, sheet, top, None)
+    said = ("pose and silo from this frame alone, without a calibration", *known.assumed)
+    return replace(known, assumed=said), fused
+
+
+def _camera(data: Frame | ArrayLike, camera: Camera | None, calibration: Calibration) -> Camera | None:
+    """The caller's camera, else the frame's own, else the calibration's."""
+    if camera is not None or (isinstance(data, Frame) and (data.camera is not None or data.points is not None)):
+        return camera
+    table = calibration.config.get("camera")
+    try:
+        return None if table is None else Camera(**{**table, "distortion": tuple(table["distortion"])})
+    except (TypeError, KeyError, ValueError):
+        raise InputError("the calibration's camera is damaged; give --camera FILE") from None
+
+
+def _inputs(
+    prepared: Prepared, known: Knowledge, sheet: Datasheet
+) -> tuple[NDArray[np.float32], Camera | None, NDArray[np.float64] | None, _core.ContentSetup]:
+    """What the core takes."""
+    depth = prepared.depth
+    if depth is None and prepared.points is not None:
+        depth = np.ascontiguousarray(prepared.points, np.float32)
+    assert depth is not None
+    camera = prepared.camera
+    rays = None if camera is None or camera.distortion_model == "none" else camera.rays()
+    setup = _core.ContentSetup(
+        (known.pose.r_x, known.pose.r_y, known.pose.t_x, known.pose.t_y), lengths_for_core(known, sheet),
+        known.covariance, WALL_STD, known.bias, known.noise, known.noise_known, known.range,
+    )  # fmt: skip
+    return depth, camera, rays, setup
+
+
+def _run(prepared: Prepared, known: Knowledge, sheet: Datasheet) -> tuple[dict[str, Any], _core.ContentSurface | None]:
+    """The core's answer."""
+    try:
+        return _core.content_measure(*_inputs(prepared, known, sheet))
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+
+
+def _closer(prepared: Prepared, known: Knowledge, sheet: Datasheet, calibration: Calibration) -> Knowledge:
+    """A cone of which nobody knows where it ends, cut off behind the farthest bare wall, so that the map fits it."""
+    radius = known.lengths.geometry.radius
+    try:
+        bare = _core.content_bare_reach(*_inputs(_every_other(prepared), known, sheet))
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    if bare is None or radius is None:
+        return known
+    farthest, cell = bare
+    return narrowed(known, calibration, min(farthest + BEHIND * cell, radius))
+
+
+def _every_other(prepared: Prepared) -> Prepared:
+    """Every other row and column of a depth image: enough to see how far the bare wall reaches."""
+    depth, camera = prepared.depth, prepared.camera
+    if depth is None or camera is None:
+        return prepared
+    few = np.ascontiguousarray(depth[::2, ::2])
+    (height, width), halves = few.shape, {name: getattr(camera, name) / 2 for name in ("fx", "fy", "cx", "cy")}
+    return replace(prepared, depth=few, camera=replace(camera, width=width, height=height, **halves))

@@ -1,0 +1,1 @@
+"""Results for people: pictures, pages, files, and the demo."""

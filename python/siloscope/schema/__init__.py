@@ -1,0 +1,1 @@
+"""Files that are written and read back, with the check of every field."""

@@ -1,0 +1,227 @@
+"""A silo's calibration: the camera's pose and the silo's geometry as many frames have them, and what they rest on."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass, field
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope.estimation.surface import PARAMETERS, SurfaceEvidence
+from siloscope.fusion.change_point import Move
+from siloscope.fusion.solve import Sums
+from siloscope.types.estimate import SiloGeometry
+from siloscope.types.pose import SiloPose
+
+SCHEMA = "siloscope.calibration/1"
+
+STATUSES = {
+    "used": "fused, with the weight that stands beside it",
+    "rejected": "it has an answer, but one that disagrees with the other frames'",
+    "before-move": "taken before the camera moved",
+    "not-averaged": "older than the last 10 of the paper's rule",
+    "refused": "read well, but it does not show enough wall; its reason says why",
+    "unreadable": "it can't be read or used",
+}
+"""What becomes of a frame: stable name and what it means."""
+
+QUALITY = {
+    "camera-moved": "the camera moved during the sequence; only the frames since are fused",
+    "few-frames": "fewer than 3 frames agree; a wrong one could not be told from a right one",
+    "many-frames-disagree": "more than a quarter of the frames disagree with the rest",
+    "frames-scatter": "the frames scatter over twice as far as they state; the covariance is widened by that",
+    "scale-unknown": "the depth scale is not known; a measured diameter would make every length surer",
+    "cone-not-seen": "no frame shows the cone; the apex and the cylinder's bottom are unknown",
+    "cylinder-not-seen": "no frame shows the cylinder; radius and cylinder's bottom are unknown",
+}
+"""Remarks on a calibration: stable code and what it means."""
+
+
+@dataclass(frozen=True)
+class FrameRecord:
+    """How one frame of the sequence agreed."""
+
+    index: int
+    """Number in the sequence, from 0, counted on when a calibration is continued."""
+    name: str
+    status: str
+    """One of `STATUSES`."""
+    weight: float = 0.0
+    """With which it was fused, 0 to 1."""
+    deviation: float | None = None
+    """Distance of its answer from the fused one: as rare as for a normal variable so many standard deviations off."""
+    pose: SiloPose | None = None
+    timestamp: float | None = None
+    reason: str | None = None
+    """Why it has no answer."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        pose = self.pose
+        return {
+            "index": self.index,
+            "name": self.name,
+            "status": self.status,
+            "weight": self.weight,
+            "deviation": self.deviation,
+            **{name: None if pose is None else getattr(pose, name) for name in ("r_x", "r_y", "t_x", "t_y")},
+            "timestamp": self.timestamp,
+            "reason": self.reason,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What a calibration rests on, and is continued from."""
+
+    frames: tuple[tuple[int, SurfaceEvidence], ...] = ()
+    """Frame number and what it says, in the order of the sequence."""
+    earlier: Sums | None = None
+    """Frames before those, added up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """Pose of the camera in its silo and the silo's geometry, from many frames. Radians and metres.
+
+    A refused calibration (`status` "refused") has no numbers; `reason` and `message` say why.
+    """
+
+    status: str
+    rule: str = "information"
+    pose: SiloPose | None = None
+    covariance: NDArray[np.float64] | None = None
+    """(4, 4) covariance of (r_x, r_y, t_x, t_y)."""
+    silo: SiloGeometry = field(default_factory=SiloGeometry)
+    silo_std: SiloGeometry = field(default_factory=SiloGeometry)
+    parameters: NDArray[np.float64] | None = None
+    """(12,) in the order of `estimation.surface.PARAMETERS`; NaN where not seen. None for the paper's rule."""
+    parameter_covariance: NDArray[np.float64] | None = None
+    """(12, 12) covariance of `parameters`, with zero rows for what is fixed or not seen."""
+    excess: float = 1.0
+    """Scatter of the frames' answers over what they state, as a factor of the variance; at least 1."""
+    scale_std: float = 0.0
+    """Standard deviation of the depth scale that nothing could tell; contained in the covariances."""
+    moves: tuple[Move, ...] = ()
+    """Moves of the camera in the sequence."""
+    frames: tuple[FrameRecord, ...] = ()
+    quality: tuple[str, ...] = ()
+    """Codes of `QUALITY`."""
+    reason: str | None = None
+    message: str | None = None
+    config: dict[str, Any] = field(default_factory=dict)
+    timing_ms: dict[str, float] = field(default_factory=dict)
+    evidence: Evidence = field(default_factory=Evidence)
+    method: str = "surface"
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is an answer."""
+        return self.status == "ok"
+
+    @property
+    def r_x(self) -> float | None:
+        """Rotation about the x-axis."""
+        return self.pose.r_x if self.pose else None
+
+    @property
+    def r_y(self) -> float | None:
+        """Rotation about the y-axis."""
+        return self.pose.r_y if self.pose else None
+
+    @property
+    def t_x(self) -> float | None:
+        """Translation along the silo's x-axis."""
+        return self.pose.t_x if self.pose else None
+
+    @property
+    def t_y(self) -> float | None:
+        """Translation along the silo's y-axis."""
+        return self.pose.t_y if self.pose else None
+
+    @property
+    def T_silo_camera(self) -> NDArray[np.float64] | None:
+        """Homogeneous (4, 4) transform with ``p_silo = T_silo_camera @ p_camera`` (Eq. 5)."""
+        return self.pose.T_silo_camera if self.pose else None
+
+    @property
+    def moved_at(self) -> Move | None:
+        """The last move of the camera, or None."""
+        return self.moves[-1] if self.moves else None
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """Number of frames by status."""
+        found = Counter(record.status for record in self.frames)
+        return {status: found[status] for status in STATUSES}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document of ``siloscope calibrate`` (schema ``siloscope.calibration/1``)."""
+        from siloscope.schema.calibration_file import evidence_to_dict
+
+        names = ("r_x", "r_y", "t_x", "t_y")
+        pose = self.pose
+        std = None if self.covariance is None else np.sqrt(np.diag(self.covariance))
+        return {
+            "schema": SCHEMA,
+            "status": self.status,
+            "reason": self.reason,
+            "message": self.message,
+            "method": self.method,
+            "rule": self.rule,
+            **{name: None if pose is None else getattr(pose, name) for name in names},
+            "std": {name: None if std is None else float(std[i]) for i, name in enumerate(names)},
+            "covariance": None if self.covariance is None else self.covariance.tolist(),
+            "T_silo_camera": None if pose is None else pose.T_silo_camera.tolist(),
+            "axis": {
+                "direction": None if pose is None else pose.axis_direction.tolist(),
+                "point": None if pose is None else pose.axis_point.tolist(),
+            },
+            "silo": {**self.silo.to_dict(), "std": self.silo_std.to_dict()},
+            "ratios": {"pixels": None, "area": None},
+            "parameters": self._parameters(),
+            "excess": self.excess,
+            "scale_std": self.scale_std,
+            "moved_at": None if self.moved_at is None else self._told(self.moved_at),
+            "moves": [self._told(move) for move in self.moves],
+            "quality": list(self.quality),
+            "counts": self.counts,
+            "frames": [record.to_dict() for record in self.frames],
+            "config": self.config,
+            "timing_ms": self.timing_ms,
+            "evidence": evidence_to_dict(self.evidence),
+        }
+
+    def _parameters(self) -> dict[str, Any] | None:
+        """All parameters with their covariance; what was not seen is null."""
+        if self.parameters is None or self.parameter_covariance is None:
+            return None
+        values = [float(v) if np.isfinite(v) else None for v in self.parameters]
+        return {"names": list(PARAMETERS), "values": values, "covariance": self.parameter_covariance.tolist()}
+
+    def _told(self, move: Move) -> dict[str, Any]:
+        name = next((record.name for record in self.frames if record.index == move.index), None)
+        return {
+            "index": move.index,
+            "name": name,
+            "turn": move.turn,
+            "shift": move.shift,
+            "significance": move.significance,
+        }
+
+    def save(self, path: str | PathLike[str]) -> None:
+        """Writes the JSON document; raises `OSError` where that is not possible."""
+        from siloscope.schema.calibration_file import write
+
+        write(self, Path(path))
+
+    @classmethod
+    def load(cls, path: str | PathLike[str]) -> Calibration:
+        """Reads a calibration file; raises `InputError` that names the file, the entry and the remedy."""
+        from siloscope.schema.calibration_file import read
+
+        return read(Path(path))

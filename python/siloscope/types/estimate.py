@@ -1,0 +1,136 @@
+"""What one frame tells: the pose, how sure it is, and the silo seen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope.types.pose import SiloPose
+
+if TYPE_CHECKING:
+    from siloscope.estimation.surface import SurfaceDetails, SurfaceEvidence
+
+
+@dataclass(frozen=True)
+class SiloGeometry:
+    """A silo as a cylinder on a cone, in the silo frame (z along gravity, 0 at the camera's height), in metres.
+
+    What was not seen is None.
+    """
+
+    radius: float | None = None
+    """Radius of the cylinder."""
+    cylinder_bottom: float | None = None
+    """z where the cylinder meets the cone."""
+    apex: float | None = None
+    """z of the cone's vertex."""
+
+    def to_dict(self) -> dict[str, float | None]:
+        """The contract's ``silo`` object."""
+        return {"radius": self.radius, "cylinder_bottom": self.cylinder_bottom, "apex": self.apex}
+
+
+@dataclass(frozen=True)
+class Ratios:
+    """Shares of cylinder, cone and feed among what was seen (section 2.4.4); they sum to at most 1."""
+
+    cylinder: float
+    cone: float
+    feed: float
+
+    def to_dict(self) -> dict[str, float]:
+        """Plain data."""
+        return {"cylinder": self.cylinder, "cone": self.cone, "feed": self.feed}
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Pose of the camera in its silo from one frame. Radians and metres.
+
+    A refused estimate (`status` "refused") has no pose: its numbers are None, and `reason` (a stable slug) and
+    `message` (a sentence with what to try) say why.
+    """
+
+    status: str
+    method: str
+    pose: SiloPose | None = None
+    covariance: NDArray[np.float64] | None = None
+    """(4, 4) covariance of (r_x, r_y, t_x, t_y)."""
+    silo: SiloGeometry = field(default_factory=SiloGeometry)
+    silo_std: SiloGeometry = field(default_factory=SiloGeometry)
+    """Standard deviations of the geometry."""
+    pixel_ratios: Ratios | None = None
+    area_ratios: Ratios | None = None
+    reason: str | None = None
+    message: str | None = None
+    config: dict[str, Any] = field(default_factory=dict)
+    """The effective settings."""
+    timing_ms: dict[str, float] = field(default_factory=dict)
+    extra: dict[str, Any] = field(default_factory=dict)
+    """Further keys of the JSON document, such as the gravity check."""
+    evidence: SurfaceEvidence | None = None
+    """What the frame says about every parameter, for fusing frames (method ``surface``)."""
+    details: SurfaceDetails | None = None
+    """Patches, residuals and labels, for pictures (method ``surface``)."""
+
+    @property
+    def ok(self) -> bool:
+        """Whether there is an answer."""
+        return self.status == "ok"
+
+    @property
+    def r_x(self) -> float | None:
+        """Rotation about the x-axis."""
+        return self.pose.r_x if self.pose else None
+
+    @property
+    def r_y(self) -> float | None:
+        """Rotation about the y-axis."""
+        return self.pose.r_y if self.pose else None
+
+    @property
+    def t_x(self) -> float | None:
+        """Translation along the silo's x-axis."""
+        return self.pose.t_x if self.pose else None
+
+    @property
+    def t_y(self) -> float | None:
+        """Translation along the silo's y-axis."""
+        return self.pose.t_y if self.pose else None
+
+    @property
+    def T_silo_camera(self) -> NDArray[np.float64] | None:
+        """Homogeneous (4, 4) transform with ``p_silo = T_silo_camera @ p_camera`` (Eq. 5)."""
+        return self.pose.T_silo_camera if self.pose else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The document of ``siloscope locate --json`` (schema ``siloscope.estimate/1``)."""
+        names = ("r_x", "r_y", "t_x", "t_y")
+        pose = self.pose
+        std = None if self.covariance is None else np.sqrt(np.diag(self.covariance))
+        return {
+            "schema": "siloscope.estimate/1",
+            "status": self.status,
+            "reason": self.reason,
+            "message": self.message,
+            "method": self.method,
+            **{name: getattr(self, name) for name in names},
+            "std": {name: None if std is None else float(std[i]) for i, name in enumerate(names)},
+            "covariance": None if self.covariance is None else self.covariance.tolist(),
+            "T_silo_camera": None if pose is None else pose.T_silo_camera.tolist(),
+            "axis": {
+                "direction": None if pose is None else pose.axis_direction.tolist(),
+                "point": None if pose is None else pose.axis_point.tolist(),
+            },
+            "silo": {**self.silo.to_dict(), "std": self.silo_std.to_dict()},
+            "ratios": {
+                "pixels": self.pixel_ratios.to_dict() if self.pixel_ratios else None,
+                "area": self.area_ratios.to_dict() if self.area_ratios else None,
+            },
+            **self.extra,
+            "config": self.config,
+            "timing_ms": self.timing_ms,
+        }
