@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 
 import siloscope
-from siloscope import Camera, Frame, frames, sensors
-from siloscope.paper.challenges import complex_feed, feeds
-from siloscope.paper.discharges import perfect, perturbed, real
-from siloscope.paper.metrics import LABELS
-from siloscope.paper.scenarios import SCENARIOS, random_big_scene, random_scene, scenario
-from siloscope.paper.sensor_trials import accelerometer
-from siloscope.paper.stand_ins import FOUR_SENSORS
-from siloscope.scene import ASTRA_S, DEFECTS, PERFECT, Feed, Scene, Silo, defects
+from siloscope import Camera, Frame, sensors
+from siloscope.reproduction.challenges import complex_feed, feeds
+from siloscope.reproduction.discharges import perfect, perturbed, real
+from siloscope.reproduction.sensor_trials import accelerometer
+from siloscope.simulation import ASTRA_S, DEFECTS, PERFECT, Feed, Scene, Silo, defects
+from siloscope.simulation.metrics import LABELS
+from siloscope.simulation.scenarios import SCENARIOS, random_big_scene, random_scene, scenario
+from siloscope.simulation.stand_ins import FOUR_SENSORS
 
 REALDATA = Path(os.environ.get("SILOSCOPE_REALDATA", Path(__file__).parents[2].parent / "shared" / "realdata"))
 """Recordings by others; not part of the project."""
@@ -328,7 +328,7 @@ RECORDINGS: dict[str, dict[str, Any]] = {
 def recording(name: str, method: str) -> Results:
     """The first frame of a recording, or the error that it is answered with."""
     try:
-        with frames.open(REALDATA / name) as source:
+        with siloscope.open(REALDATA / name) as source:
             frame = next(iter(source))
         return {"estimate": siloscope.locate(frame, method=method, **RECORDINGS[name])}
     except siloscope.SiloscopeError as error:
