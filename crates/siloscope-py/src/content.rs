@@ -14,9 +14,9 @@ use siloscope::content::fit::Surface;
 use siloscope::content::measure::{Content, Setup, bare_reach, measure, shape_of};
 use siloscope::content::returns::{Rays, Source};
 use siloscope::content::shape::{Form, Shape};
-use siloscope::content::vessel::Vessel;
 use siloscope::content::volume::Kind;
 use siloscope::geometry::sensor::{DepthBias, NoiseLaw};
+use siloscope::geometry::vessel::Vessel;
 use siloscope::{Camera, SiloPose, Vec3};
 
 /// A silo as Python gives it: radius, cylinder_bottom, apex, top, outlet radius and length, ovality c and s.

@@ -8,8 +8,9 @@ use siloscope::base::refusal::Refusal;
 use siloscope::base::workers::Workers;
 use siloscope::fusion::frame_factor::FrameShare;
 use siloscope::fusion::relinearize::{Ray, seen_from};
+use siloscope::geometry::parameters::{Information, PARAMETERS, Parameters};
 use siloscope::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
-use siloscope::geometry::vessel::{Cone, Information, PARAMETERS, Parameters, SiloSurface};
+use siloscope::geometry::surface::{Cone, SiloSurface};
 use siloscope::surface_fit::segmentation::{coverage, label_pixels};
 use siloscope::surface_fit::tiles::DepthImage;
 use siloscope::surface_fit::warm_start::KnownWall;
@@ -151,7 +152,10 @@ fn add_share(py: Python<'_>, out: &Bound<'_, PyDict>, share: &FrameShare) -> PyR
     out.set_item("prior", PyArray1::from_slice(py, share.prior.as_slice()))
 }
 
-fn matrix<'py>(py: Python<'py>, m: &siloscope::geometry::vessel::Information) -> PyResult<Bound<'py, PyArray2<f64>>> {
+fn matrix<'py>(
+    py: Python<'py>,
+    m: &siloscope::geometry::parameters::Information,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
     PyArray1::from_slice(py, m.transpose().as_slice()).reshape([PARAMETERS, PARAMETERS])
 }
 

@@ -4,23 +4,8 @@ use crate::clutter::Bundle;
 use crate::feed::Feed;
 use crate::silo::{Exit, Silo};
 use crate::wall::Wall;
+pub use siloscope::geometry::label::Label;
 use siloscope::{Error, Result, Vec3};
-
-/// What a pixel shows; the numbers are those of the label images.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Label {
-    /// Nothing.
-    None = 0,
-    /// The cylinder's wall.
-    Cylinder = 1,
-    /// The cone.
-    Cone = 2,
-    /// Feed, also where it sticks to a wall.
-    Feed = 3,
-    /// Outlet, roof, clutter, flying pixel or dust.
-    Other = 4,
-}
 
 /// Where a ray ends.
 #[derive(Debug, Clone)]

@@ -1,5 +1,6 @@
-//! What every room needs: errors, refusals, workers.
+//! What every room needs: errors, refusals, workers, the clock.
 
+pub mod clock;
 pub mod error;
 pub mod refusal;
 pub mod workers;

@@ -5,6 +5,7 @@ use super::doubt::Lever;
 use super::grid::Grid;
 use super::returns::{Line, Returns};
 use crate::geometry::sensor::NoiseLaw;
+use crate::stats::robust::{MAD_TO_STD, upper_median_by};
 
 /// Returns farther than so many robust standard deviations from their cell's median are clutter.
 const CLUTTER_SIGMAS: f32 = 4.0;
@@ -265,17 +266,13 @@ fn window(group: &mut [Sample], noise: &NoiseLaw) -> Window {
     let depth = median(group, |s| s.2);
     let z = median(group, |s| s.1);
     group.iter_mut().for_each(|s| s.1 = (s.1 - z).abs());
-    let scatter = 1.4826 * median(group, |s| s.1);
+    let scatter = MAD_TO_STD as f32 * median(group, |s| s.1);
     let own = noise.sigma(f64::from(depth)) as f32;
     let half = CLUTTER_SIGMAS * scatter.max(own) + 1e-4;
     Window { low: z - half, high: z + half }
 }
 
-/// Upper median; 0 for nothing.
+/// Upper median of a sample's height or depth; 0 for no sample.
 fn median(group: &mut [Sample], key: impl Fn(&Sample) -> f32) -> f32 {
-    if group.is_empty() {
-        return 0.0;
-    }
-    let middle = group.len() / 2;
-    key(group.select_nth_unstable_by(middle, |a, b| key(a).total_cmp(&key(b))).1)
+    upper_median_by(group, |s| f64::from(key(s))).unwrap_or(0.0) as f32
 }

@@ -4,8 +4,8 @@ use super::cells::Cell;
 use super::doubt::{Covariance, Lever, deviation};
 use super::fit::{Surface, fit, sketch};
 use super::grid::Grid;
-use super::vessel::Vessel;
 use super::volume::Kind;
+use crate::geometry::vessel::Vessel;
 
 /// A cell shows content where its mean lies so many standard deviations above the floor.
 const SIGMAS: f64 = 4.0;

@@ -1,8 +1,8 @@
 //! How points and floor move when the calibration is a little wrong.
 
-use super::vessel::Vessel;
 use crate::SiloPose;
 use crate::geometry::sensor::DepthBias;
+use crate::geometry::vessel::Vessel;
 use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
 
 /// Number of parameters of a calibration.
@@ -34,15 +34,10 @@ pub struct Lever {
 impl Lever {
     /// Works out the matrices of a pose.
     pub fn new(pose: &SiloPose, bias: DepthBias) -> Self {
-        let (sx, cx) = pose.r_x.sin_cos();
-        let (sy, cy) = pose.r_y.sin_cos();
         Self {
             bias,
             rotation: pose.rotation(),
-            turned: [
-                Matrix3::new(0.0, cx * sy, -sx * sy, 0.0, -sx, -cx, 0.0, cx * cy, -sx * cy),
-                Matrix3::new(-sy, sx * cy, cx * cy, 0.0, 0.0, 0.0, -cy, -sx * sy, -cx * sy),
-            ],
+            turned: pose.rotation_derivatives(),
             translation: Vector3::new(pose.t_x, pose.t_y, 0.0),
         }
     }

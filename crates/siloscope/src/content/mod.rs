@@ -15,6 +15,5 @@ pub mod returns;
 pub mod shape;
 pub mod sight;
 pub mod trend;
-pub mod vessel;
 pub mod volume;
 pub mod wall;

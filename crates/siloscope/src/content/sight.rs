@@ -1,7 +1,7 @@
 //! How much of the silo the sensor sees at all.
 
 use super::returns::{Rays, Returns, Source};
-use super::vessel::Vessel;
+use crate::geometry::vessel::Vessel;
 use crate::{SiloPose, Vec3};
 
 /// What the sensor sees of what it should.

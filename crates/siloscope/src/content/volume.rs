@@ -6,7 +6,7 @@
 
 use super::detail;
 use super::fit::Surface;
-use super::vessel::{Shells, Vessel};
+use crate::geometry::vessel::{Shells, Vessel};
 use nalgebra::DVector;
 use std::f64::consts::TAU;
 

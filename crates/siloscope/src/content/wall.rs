@@ -3,8 +3,9 @@
 use super::doubt::{Covariance, DEPTH, Lever, POSE};
 use super::fit::Surface;
 use super::returns::Returns;
-use super::vessel::Vessel;
 use crate::geometry::sensor::NoiseLaw;
+use crate::geometry::vessel::Vessel;
+use crate::stats::robust::tukey_weight;
 use nalgebra::{Matrix4, Vector4};
 
 /// How far the wall seems to have moved, as a change of the camera's pose (r_x, r_y, t_x, t_y).
@@ -30,7 +31,7 @@ const CLEARANCE: f64 = 0.1;
 const UNEVEN: f64 = 0.005;
 /// Rounds of reweighting, and the residual beyond which a return loses all say, in standard deviations.
 const ROUNDS: usize = 4;
-const TUKEY: f64 = 5.0;
+const CUTOFF: f64 = 5.0;
 /// Fewest returns that tell.
 const FEWEST: usize = 60;
 
@@ -82,7 +83,7 @@ fn normal_equations(residuals: &[Residual], change: &Vector4<f64>) -> (Matrix4<f
     let (mut normal, mut right) = (Matrix4::identity() * 1e-6, Vector4::zeros());
     for r in residuals {
         let left = r.after(change) / r.sigma;
-        let weight = (1.0 - (left / TUKEY).powi(2)).max(0.0).powi(2) / (r.sigma * r.sigma);
+        let weight = tukey_weight(left * left, CUTOFF) / (r.sigma * r.sigma);
         normal += weight * r.by_pose * r.by_pose.transpose();
         right -= weight * r.by_pose * r.distance;
     }

@@ -7,7 +7,7 @@
 //! A frame's own answer may take the silo for round. What it says here never does: other frames may see its ovality.
 
 use crate::fusion::relinearize::Ray;
-use crate::geometry::vessel::{Information, OVALITY, PARAMETERS, Parameters};
+use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
 use crate::surface_fit::polish::TileEquation;
 use crate::surface_fit::solver::{System, tukey};
 

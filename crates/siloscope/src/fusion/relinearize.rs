@@ -6,10 +6,11 @@
 //! the depths of another wall: u(θ) = (JᵀWJ)⁻¹ JᵀW (φ(θ) − φ(base)), with φ the predicted readings, J their derivatives
 //! at the base and W the rays' information. Near the base u(θ) = θ − base.
 
-use crate::SiloPose;
 use crate::Vec3;
+use crate::geometry::evaluator::SurfaceEvaluator;
+use crate::geometry::parameters::{Information, PARAMETERS, Parameters};
 use crate::geometry::sensor::DepthBias;
-use crate::geometry::vessel::{Cone, Information, PARAMETERS, Parameters, Part, PlacedSurface, SiloSurface};
+use crate::geometry::surface::{Part, SiloSurface};
 use crate::surface_fit::polish::TileEquation;
 use crate::surface_fit::solver::tukey;
 use nalgebra::{Cholesky, Const};
@@ -44,28 +45,15 @@ fn spread(tiles: &[&TileEquation], n: usize, ray_of: &impl Fn(usize) -> Vec3) ->
     (0..n).map(|k| ray(tiles[(2 * k + 1) * tiles.len() / (2 * n)])).collect()
 }
 
-/// The parameters of a wall and a depth bias; NaN for a part that is not there.
-pub fn parameters_of(surface: &SiloSurface, bias: &DepthBias) -> Parameters {
-    let SiloPose { r_x, r_y, t_x, t_y } = surface.pose;
-    let (slope, intercept) = surface.cone.map_or((f64::NAN, f64::NAN), |c| (c.slope, c.intercept()));
-    let radius = surface.radius.unwrap_or(f64::NAN);
-    let ([cos, sin], DepthBias { offset, scale, quadratic }) = (surface.ovality, *bias);
-    Parameters::from([r_x, r_y, t_x, t_y, radius, slope, intercept, offset, scale, quadratic, cos, sin])
-}
-
 /// A wall and a depth bias, ready to predict readings.
 struct Place {
-    wall: PlacedSurface,
+    wall: SurfaceEvaluator,
     bias: DepthBias,
 }
 
 impl Place {
     fn new(p: &Parameters) -> Self {
-        let pose = SiloPose { r_x: p[0], r_y: p[1], t_x: p[2], t_y: p[3] };
-        let radius = Some(p[4]).filter(|r| r.is_finite());
-        let cone = Some(Cone::with_intercept(p[5], p[6])).filter(|c| c.slope.is_finite() && c.apex.is_finite());
-        let wall = PlacedSurface::new(SiloSurface { pose, radius, cone, ovality: [p[10], p[11]] });
-        Self { wall, bias: DepthBias { offset: p[7], scale: p[8], quadratic: p[9] } }
+        Self { wall: SurfaceEvaluator::new(SiloSurface::of_parameters(p)), bias: DepthBias::of_parameters(p) }
     }
 
     /// The part that a ray meets.

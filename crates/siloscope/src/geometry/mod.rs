@@ -2,7 +2,12 @@
 
 pub mod backproject;
 pub mod camera;
+pub mod evaluator;
+pub mod label;
 pub mod normals;
+pub mod parameters;
 pub mod pose;
+pub mod raycast;
 pub mod sensor;
+pub mod surface;
 pub mod vessel;

@@ -43,6 +43,16 @@ impl SiloPose {
         Matrix3::new(cy, sx * sy, cx * sy, 0.0, cx, -sx, -sy, sx * cy, cx * cy)
     }
 
+    /// Derivatives of the rotation by r_x and by r_y.
+    pub fn rotation_derivatives(&self) -> [Matrix3<f64>; 2] {
+        let (sx, cx) = self.r_x.sin_cos();
+        let (sy, cy) = self.r_y.sin_cos();
+        [
+            Matrix3::new(0.0, cx * sy, -sx * sy, 0.0, -sx, -cx, 0.0, cx * cy, -sx * cy),
+            Matrix3::new(-sy, sx * cy, cx * cy, 0.0, 0.0, 0.0, -cy, -sx * sy, -cx * sy),
+        ]
+    }
+
     /// Homogeneous transform with `p_silo = T_silo_camera · p_camera` (Eq. 5).
     #[allow(non_snake_case)]
     pub fn T_silo_camera(&self) -> Matrix4<f64> {

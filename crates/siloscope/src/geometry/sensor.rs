@@ -1,5 +1,7 @@
 //! What a depth sensor does to a true depth: systematic error and noise (Eqs. 8–10).
 
+use crate::geometry::parameters::{BIAS, Parameters, SCALE};
+
 /// Systematic depth error: measured = d + offset + scale·d + quadratic·d², d the true depth in metres (Eq. 10).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct DepthBias {
@@ -12,6 +14,17 @@ pub struct DepthBias {
 }
 
 impl DepthBias {
+    /// The bias of parameters.
+    pub fn of_parameters(p: &Parameters) -> Self {
+        Self { offset: p[BIAS.start], scale: p[SCALE], quadratic: p[BIAS.end - 1] }
+    }
+
+    /// Adds the depth bias's part of a step of the fit.
+    pub fn stepped(&self, step: &Parameters) -> Self {
+        let by = Self::of_parameters(step);
+        Self { offset: self.offset + by.offset, scale: self.scale + by.scale, quadratic: self.quadratic + by.quadratic }
+    }
+
     /// The measured depth of a true depth, without noise.
     #[inline]
     pub fn measured(&self, d: f64) -> f64 {

@@ -1,355 +1,117 @@
-//! The silo's wall as a surface: a cylinder above a cone, its implicit functions, derivatives and ray intersections.
-//!
-//! In the silo frame, with ρ = √(x² + y²): the cylinder is ρ − R = 0 for z below `cylinder_bottom` in number, the cone
-//! is ρ − m·(z_a − z) = 0 from there to its apex z_a. Either may be missing. A real silo is a little oval: both radii
-//! then change with the azimuth φ by the factor 1 + c·cos 2φ + s·sin 2φ. The gradient of both has a radial part of 1, so
-//! one residual formula serves both: the distance along a ray with direction q is F / (∇F·q).
+//! The inside of a silo that holds feed: a cylinder on a cone, perhaps with an outlet pipe below the cone.
 
-use crate::{SiloPose, Vec3};
-use nalgebra::{Matrix3, SMatrix, SVector};
+use crate::{Error, Result};
+use std::f64::consts::PI;
 
-/// Number of parameters of the fit.
-pub const PARAMETERS: usize = 12;
-
-/// Index of the first of the ovality's two parameters.
-pub const OVALITY: usize = 10;
-
-/// Order of the parameters: r_x, r_y, t_x, t_y, radius, cone slope, cone intercept, the depth bias (offset, scale,
-/// quadratic), and the ovality (cosine and sine part).
+/// A silo's inside in the silo frame (z down, 0 at the camera's height). Metres.
 ///
-/// The cone's intercept is its radius m·z_a at the camera's height. The cone's radius m·z_a − m·z is linear in it and in
-/// the slope. In slope and apex it is not: where little of the cone is seen, a frame leaves a long valley open between
-/// them, and that would be bent.
-pub type Parameters = SVector<f64, PARAMETERS>;
-
-/// Information or covariance over `Parameters`.
-pub type Information = SMatrix<f64, PARAMETERS, PARAMETERS>;
-
-/// Which part of the wall a point belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Part {
-    /// The cylinder.
-    Cylinder,
-    /// The cone.
-    Cone,
-}
-
-/// Cylinder and cone about one axis; a part that is not there is `None`.
+/// The floor under a place is the cone, and within the outlet's radius the outlet's closed end.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SiloSurface {
-    /// Camera in the silo.
-    pub pose: SiloPose,
-    /// Radius R of the cylinder, metres.
-    pub radius: Option<f64>,
-    /// The cone.
-    pub cone: Option<Cone>,
-    /// Ovality e = (c, s): the cross-section's radius is larger by the factor 1 + c·cos 2φ + s·sin 2φ.
+pub struct Vessel {
+    /// Radius of the cylinder.
+    pub radius: f64,
+    /// z where the cylinder meets the cone.
+    pub cylinder_bottom: f64,
+    /// z of the cone's vertex; equal to `cylinder_bottom` for a flat floor.
+    pub apex: f64,
+    /// z up to which the silo can be filled.
+    pub top: f64,
+    /// Radius of the outlet pipe on the axis; 0 for none.
+    pub outlet_radius: f64,
+    /// How far the outlet pipe's closed end lies below the cone's vertex.
+    pub outlet_length: f64,
+    /// Ovality (c, s): the cross-section's radius is larger by the factor 1 + c cos 2φ + s sin 2φ. Lengths are means.
     pub ovality: [f64; 2],
 }
 
-/// A cone that opens upwards: ρ = m·(z_a − z).
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Cone {
-    /// m, radius gained per metre of height.
-    pub slope: f64,
-    /// z_a of the vertex in the silo frame, metres.
-    pub apex: f64,
-}
-
-impl Cone {
-    /// The cone with a slope m whose radius at the camera's height is m·z_a, metres.
-    pub fn with_intercept(slope: f64, intercept: f64) -> Self {
-        Self { slope, apex: intercept / slope }
-    }
-
-    /// Radius m·z_a of the cone at the camera's height, metres.
-    pub fn intercept(&self) -> f64 {
-        self.slope * self.apex
-    }
-}
-
-/// How far surfaces that are near each other may differ; lengths as shares of the silo's size.
-#[derive(Debug, Clone, Copy)]
-pub struct Reach {
-    /// Angle between the axes, radians.
-    pub tilt: f64,
-    /// Distance between the axes at the camera's height.
-    pub shift: f64,
-    /// Difference of the radii.
+/// Derivatives of a volume by the lengths of the geometry, m³/m.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Shells {
+    /// Derivative by the radius.
     pub radius: f64,
-    /// Difference of the cones' slopes, metres of radius per metre of height.
-    pub slope: f64,
-    /// Difference of the vertices' heights.
+    /// Derivative by the cylinder's lower edge.
+    pub cylinder_bottom: f64,
+    /// Derivative by the vertex.
     pub apex: f64,
 }
 
-impl SiloSurface {
-    /// z where the cylinder meets the cone; infinite on the side of the missing part.
-    pub fn cylinder_bottom(&self) -> f64 {
-        match (self.radius, self.cone) {
-            (Some(radius), Some(cone)) => cone.apex - radius / cone.slope,
-            (Some(_), None) => f64::INFINITY,
-            _ => f64::NEG_INFINITY,
-        }
-    }
-
-    /// A length that tells how large the silo is: its radius, or the cone's radius halfway to the camera's height.
-    pub fn size(&self) -> f64 {
-        self.radius.or(self.cone.map(|c| 0.5 * c.intercept().abs())).unwrap_or(1.0)
-    }
-
-    /// The surface without a part.
-    pub fn without(self, part: Option<Part>) -> Self {
-        match part {
-            Some(Part::Cylinder) => Self { radius: None, ..self },
-            Some(Part::Cone) => Self { cone: None, ..self },
-            None => self,
-        }
-    }
-
-    /// Whether it has the same parts as another one, and in the same place.
-    pub fn is_near(&self, other: &Self, reach: &Reach) -> bool {
-        let size = other.size();
-        let near = |a: Option<f64>, b: Option<f64>, reach: f64| match (a, b) {
-            (Some(a), Some(b)) => (a - b).abs() < reach,
-            (a, b) => a.is_none() && b.is_none(),
+impl Vessel {
+    /// Checks every length by its name.
+    pub fn validate(&self) -> Result<()> {
+        let check = |name, value: f64, fits: bool, bounds| match value.is_finite() && fits {
+            true => Ok(()),
+            false => Err(Error::Setting { name, bounds, value }),
         };
-        let (a, b) = (&self.pose, &other.pose);
-        (a.r_x - b.r_x).hypot(a.r_y - b.r_y) < reach.tilt
-            && (a.t_x - b.t_x).hypot(a.t_y - b.t_y) < reach.shift * size
-            && near(self.radius, other.radius, reach.radius * size)
-            && near(self.cone.map(|c| c.slope), other.cone.map(|c| c.slope), reach.slope)
-            && near(self.cone.map(|c| c.apex), other.cone.map(|c| c.apex), reach.apex * size)
+        check("radius", self.radius, (1e-3..=1e3).contains(&self.radius), "between 0.001 and 1000 m")?;
+        check("cylinder_bottom", self.cylinder_bottom, self.cylinder_bottom.abs() <= 1e3, "between -1000 and 1000 m")?;
+        let cone = self.apex - self.cylinder_bottom;
+        check("apex", self.apex, (0.0..=1e3).contains(&cone), "at or up to 1000 m below cylinder_bottom")?;
+        check("top", self.top, (-1e3..self.apex).contains(&self.top), "above the cone's vertex")?;
+        check(
+            "outlet_radius",
+            self.outlet_radius,
+            (0.0..self.radius).contains(&self.outlet_radius),
+            "below the radius",
+        )?;
+        check("outlet_length", self.outlet_length, (0.0..=1e3).contains(&self.outlet_length), "between 0 and 1000 m")?;
+        let oval = self.ovality[0].hypot(self.ovality[1]);
+        check("ovality", oval, oval <= 0.2, "at most 0.2")
     }
 
-    /// Adds a step of the fit; the depth bias is not part of the surface.
-    pub fn stepped(&self, step: &Parameters) -> Self {
-        Self {
-            pose: SiloPose {
-                r_x: self.pose.r_x + step[0],
-                r_y: self.pose.r_y + step[1],
-                t_x: self.pose.t_x + step[2],
-                t_y: self.pose.t_y + step[3],
-            },
-            radius: self.radius.map(|r| r + step[4]),
-            cone: self.cone.map(|c| Cone::with_intercept(c.slope + step[5], c.intercept() + step[6])),
-            ovality: [self.ovality[0] + step[10], self.ovality[1] + step[11]],
+    /// Area of the oval cross-section over that of the circle of the mean radius: the mean of the factor's square.
+    pub fn stretch(&self) -> f64 {
+        1.0 + 0.5 * (self.ovality[0] * self.ovality[0] + self.ovality[1] * self.ovality[1])
+    }
+
+    /// Height of the cone.
+    pub fn cone_height(&self) -> f64 {
+        self.apex - self.cylinder_bottom
+    }
+
+    /// z of the floor at a distance from the axis.
+    pub fn floor(&self, r: f64) -> f64 {
+        if r < self.outlet_radius { self.apex + self.outlet_length } else { self.cone(r) }
+    }
+
+    /// z of the cone's wall at a distance from the axis.
+    pub fn cone(&self, r: f64) -> f64 {
+        self.apex - self.cone_height() * r / self.radius
+    }
+
+    /// Derivatives of the cone's z at a distance from the axis by the lengths of the geometry.
+    pub fn cone_derivatives(&self, r: f64) -> Shells {
+        let share = r / self.radius;
+        Shells { radius: self.cone_height() * share / self.radius, cylinder_bottom: share, apex: 1.0 - share }
+    }
+
+    /// Volume under the level plane at a height z.
+    pub fn volume_below(&self, z: f64) -> f64 {
+        let disc = PI * self.radius * self.radius;
+        let in_cylinder = disc * (self.cylinder_bottom - z).max(0.0);
+        self.stretch() * (in_cylinder + self.cone_below(z)) + self.pipe_below(z)
+    }
+
+    /// Volume that the silo holds up to its top.
+    pub fn capacity(&self) -> f64 {
+        self.volume_below(self.top)
+    }
+
+    fn cone_below(&self, z: f64) -> f64 {
+        let height = self.cone_height();
+        if height <= 0.0 {
+            return 0.0;
         }
-    }
-}
-
-/// A surface with its rotation matrices worked out, for use on many points.
-#[derive(Debug, Clone)]
-pub struct PlacedSurface {
-    /// The surface.
-    pub surface: SiloSurface,
-    bottom: f64,
-    rotation: Matrix3<f64>,
-    d_rx: Matrix3<f64>,
-    d_ry: Matrix3<f64>,
-    /// −1 where the camera is inside (the usual case), +1 where it looks at the wall from outside.
-    root: f64,
-    /// Constant terms of the ray equations: of the cylinder, and of the cone (m², m²·z_a, the rest).
-    cylinder_c: f64,
-    cone_m2: f64,
-    cone_b: f64,
-    cone_c: f64,
-}
-
-/// A place on or near the wall: the implicit function there and its gradient.
-#[derive(Debug, Clone, Copy)]
-pub struct Local {
-    /// Which part.
-    pub part: Part,
-    /// The point in the silo frame.
-    pub p: Vec3,
-    /// Value of the implicit function F.
-    pub value: f64,
-    /// Gradient of F in the silo frame; its radial component is 1.
-    pub gradient: Vec3,
-    /// cos 2φ and sin 2φ of the azimuth φ.
-    pub double_angle: [f64; 2],
-    /// The ovality's factor 1 + c·cos 2φ + s·sin 2φ.
-    pub oval: f64,
-}
-
-impl PlacedSurface {
-    /// Works out the matrices of a surface.
-    pub fn new(surface: SiloSurface) -> Self {
-        let SiloPose { r_x, r_y, t_x, t_y } = surface.pose;
-        let (sx, cx) = r_x.sin_cos();
-        let (sy, cy) = r_y.sin_cos();
-        let (m2, apex) = surface.cone.map_or((f64::NAN, f64::NAN), |c| (c.slope * c.slope, c.apex));
-        let outside = surface.radius.is_some_and(|r| t_x.hypot(t_y) > r);
-        Self {
-            surface,
-            bottom: surface.cylinder_bottom(),
-            rotation: surface.pose.rotation(),
-            d_rx: Matrix3::new(0.0, cx * sy, -sx * sy, 0.0, -sx, -cx, 0.0, cx * cy, -sx * cy),
-            d_ry: Matrix3::new(-sy, sx * cy, cx * cy, 0.0, 0.0, 0.0, -cy, -sx * sy, -cx * sy),
-            root: if outside { 1.0 } else { -1.0 },
-            cylinder_c: surface.radius.map_or(f64::NAN, |r| t_x * t_x + t_y * t_y - r * r),
-            cone_m2: m2,
-            cone_b: m2 * apex,
-            cone_c: t_x * t_x + t_y * t_y - m2 * apex * apex,
-        }
+        let share = ((self.apex - z) / height).clamp(0.0, 1.0);
+        PI * self.radius * self.radius * height / 3.0 * share.powi(3)
     }
 
-    /// A direction from the camera frame to the silo frame.
-    #[inline]
-    pub fn turn(&self, direction: &Vec3) -> Vec3 {
-        self.rotation * direction
-    }
-
-    /// A point from the camera frame to the silo frame.
-    #[inline]
-    pub fn to_silo(&self, p: &Vec3) -> Vec3 {
-        let turned = self.rotation * p;
-        Vec3::new(turned.x + self.surface.pose.t_x, turned.y + self.surface.pose.t_y, turned.z)
-    }
-
-    /// z where the cylinder ends.
-    #[inline]
-    pub fn bottom(&self) -> f64 {
-        self.bottom
-    }
-
-    /// The implicit function at a point of the camera frame, of the part that is there at its height.
-    #[inline]
-    pub fn local(&self, p_camera: &Vec3) -> Local {
-        self.local_in_silo(self.to_silo(p_camera))
-    }
-
-    /// The same at depth `d` on a ray whose direction is already turned into the silo frame.
-    #[inline(always)]
-    pub fn local_along(&self, turned: &Vec3, d: f64) -> Local {
-        let SiloPose { t_x, t_y, .. } = self.surface.pose;
-        self.local_in_silo(Vec3::new(turned.x * d + t_x, turned.y * d + t_y, turned.z * d))
-    }
-
-    #[inline(always)]
-    fn local_in_silo(&self, p: Vec3) -> Local {
-        self.local_of(p, if p.z < self.bottom { Part::Cylinder } else { Part::Cone })
-    }
-
-    /// The implicit function of a given part at a point of the silo frame; the other part where that one is missing.
-    #[inline(always)]
-    pub fn local_of(&self, p: Vec3, part: Part) -> Local {
-        let rho = (p.x * p.x + p.y * p.y).sqrt().max(1e-12); // lengths here are far from overflow: no hypot needed
-        let inverse = 1.0 / rho;
-        let [x, y] = [p.x * inverse, p.y * inverse];
-        let (part, radius, rise) = match (part, self.surface.radius, self.surface.cone) {
-            (Part::Cone, _, Some(cone)) | (Part::Cylinder, None, Some(cone)) => {
-                (Part::Cone, cone.slope * (cone.apex - p.z), cone.slope)
-            }
-            (_, radius, _) => (Part::Cylinder, radius.unwrap_or(f64::NAN), 0.0),
-        };
-        let [c, s] = self.surface.ovality;
-        let (cos, sin) = (x * x - y * y, 2.0 * x * y);
-        let oval = 1.0 + c * cos + s * sin;
-        let around = -2.0 * radius * inverse * (s * cos - c * sin); // ∂F/∂φ, divided by ρ
-        Local {
-            part,
-            p,
-            value: rho - radius * oval,
-            gradient: Vec3::new(x - around * y, y + around * x, rise * oval),
-            double_angle: [cos, sin],
-            oval,
-        }
-    }
-
-    /// Derivative of F at a point (camera frame and its `Local`) with respect to the parameters.
-    #[inline(always)]
-    pub fn derivative(&self, p_camera: &Vec3, at: &Local) -> Parameters {
-        let g = &at.gradient;
-        let mut d = Parameters::zeros();
-        (d[0], d[1]) = (g.dot(&(self.d_rx * p_camera)), g.dot(&(self.d_ry * p_camera)));
-        (d[2], d[3]) = (g.x, g.y);
-        let radius = match (at.part, self.surface.cone) {
-            (Part::Cone, Some(cone)) => {
-                (d[5], d[6]) = (at.p.z * at.oval, -at.oval);
-                cone.slope * (cone.apex - at.p.z)
-            }
-            _ => {
-                d[4] = -at.oval;
-                self.surface.radius.unwrap_or(0.0)
-            }
-        };
-        (d[10], d[11]) = (-radius * at.double_angle[0], -radius * at.double_angle[1]);
-        d
-    }
-
-    /// How the axis' point at height z moves along x and y with the parameters: the turn's share and the shift's.
-    pub fn axis_shift(&self, z: f64) -> [Parameters; 2] {
-        let SiloPose { t_x, t_y, .. } = self.surface.pose;
-        let camera = self.rotation.transpose() * Vec3::new(-t_x, -t_y, z);
-        let (by_rx, by_ry) = (self.d_rx * camera, self.d_ry * camera);
-        [0, 1].map(|k| {
-            let mut row = Parameters::zeros();
-            (row[0], row[1], row[2 + k]) = (by_rx[k], by_ry[k], 1.0);
-            row
-        })
-    }
-
-    /// True depth at which the ray with direction `q` (camera frame, z = 1) meets the wall, and on which part.
-    ///
-    /// NaN where the ray misses.
-    #[inline]
-    pub fn depth(&self, q: &Vec3) -> (f64, Part) {
-        let ray = [q.x, q.y];
-        let cylinder = self.rounded(ray, self.cylinder_depth(ray), Part::Cylinder);
-        if self.surface.cone.is_none() || cylinder * self.down(ray) < self.bottom {
-            (cylinder, Part::Cylinder)
-        } else {
-            (self.rounded(ray, self.cone_depth(ray), Part::Cone), Part::Cone)
-        }
-    }
-
-    /// The depth on the oval wall from that on the round one: three Newton steps, none where there is no ovality.
-    #[inline]
-    pub fn rounded(&self, ray: [f64; 2], mut d: f64, part: Part) -> f64 {
-        if self.surface.ovality == [0.0; 2] {
-            return d;
-        }
-        let q = Vec3::new(ray[0], ray[1], 1.0);
-        let turned = self.turn(&q);
-        for _ in 0..3 {
-            let at = self.local_of(self.to_silo(&(q * d)), part);
-            d -= at.value / at.gradient.dot(&turned);
-        }
-        d
-    }
-
-    /// True depth at which the ray `(x, y, 1)` of the camera frame meets the endless cylinder; NaN where it misses.
-    #[inline]
-    pub fn cylinder_depth(&self, ray: [f64; 2]) -> f64 {
-        let q = self.turn_ray(ray);
-        let SiloPose { t_x, t_y, .. } = self.surface.pose;
-        let a = q[0] * q[0] + q[1] * q[1];
-        let b = t_x * q[0] + t_y * q[1];
-        (-b - self.root * (b * b - a * self.cylinder_c).sqrt()) / a
-    }
-
-    /// True depth at which the ray `(x, y, 1)` of the camera frame meets the endless cone; NaN where it misses.
-    #[inline]
-    pub fn cone_depth(&self, ray: [f64; 2]) -> f64 {
-        let q = self.turn_ray(ray);
-        let SiloPose { t_x, t_y, .. } = self.surface.pose;
-        let a = q[0] * q[0] + q[1] * q[1] - self.cone_m2 * q[2] * q[2];
-        let b = t_x * q[0] + t_y * q[1] + self.cone_b * q[2];
-        -self.cone_c / (b + (b * b - a * self.cone_c).sqrt())
-    }
-
-    /// Height in the silo frame gained per metre of depth along the ray `(x, y, 1)` of the camera frame.
-    #[inline]
-    pub fn down(&self, [x, y]: [f64; 2]) -> f64 {
-        self.rotation[(2, 0)] * x + self.rotation[(2, 1)] * y + self.rotation[(2, 2)]
-    }
-
-    #[inline]
-    fn turn_ray(&self, [x, y]: [f64; 2]) -> [f64; 3] {
-        let r = &self.rotation;
-        [0, 1, 2].map(|k| r[(k, 0)] * x + r[(k, 1)] * y + r[(k, 2)])
+    /// The outlet pipe: from its closed end up to the cone's wall, as far as that is outside the cone.
+    fn pipe_below(&self, z: f64) -> f64 {
+        let disc = PI * self.outlet_radius * self.outlet_radius;
+        let rim = self.cone(self.outlet_radius);
+        let filled = disc * (self.apex + self.outlet_length - z.max(rim)).max(0.0);
+        let cone_inside = if z > rim { self.cone_below(z) } else { self.cone_below(rim) };
+        filled - cone_inside.min(filled)
     }
 }
 
@@ -358,67 +120,68 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn silo(r_x: f64, r_y: f64, t_x: f64, t_y: f64) -> SiloSurface {
-        SiloSurface {
-            pose: SiloPose { r_x, r_y, t_x, t_y },
-            radius: Some(1.25),
-            cone: Some(Cone { slope: 0.8, apex: 5.0 }),
-            ovality: [0.004, -0.003],
+    fn vessel() -> Vessel {
+        Vessel {
+            radius: 1.25,
+            cylinder_bottom: 4.5,
+            apex: 5.5,
+            top: 0.0,
+            outlet_radius: 0.0,
+            outlet_length: 0.0,
+            ovality: [0.0; 2],
+        }
+    }
+
+    /// Volume by thin shells around the axis.
+    fn by_shells(v: &Vessel, z: f64) -> f64 {
+        let n = 200_000;
+        let dr = v.radius / n as f64;
+        (0..n).map(|i| (i as f64 + 0.5) * dr).map(|r| 2.0 * PI * r * dr * (v.floor(r) - z).max(0.0)).sum()
+    }
+
+    #[test]
+    fn level_volumes_have_their_closed_forms() {
+        let v = vessel();
+        assert!((v.volume_below(4.5) - PI * 1.25 * 1.25 / 3.0).abs() < 1e-12);
+        assert!((v.volume_below(5.0) - PI * 0.625 * 0.625 * 0.5 / 3.0).abs() < 1e-12);
+        assert!((v.capacity() - PI * 1.25 * 1.25 * (4.5 + 1.0 / 3.0)).abs() < 1e-12);
+        assert_eq!(v.volume_below(5.6), 0.0);
+    }
+
+    #[test]
+    fn an_outlet_pipe_adds_its_own_volume() {
+        let v = Vessel { outlet_radius: 0.2, outlet_length: 0.3, ..vessel() };
+        for z in [0.0, 4.0, 4.9, 5.38, 5.5, 5.7] {
+            assert!((v.volume_below(z) - by_shells(&v, z)).abs() < 1e-5, "z = {z}");
+        }
+    }
+
+    #[test]
+    fn lengths_out_of_bounds_are_refused_by_name() {
+        let bad = [
+            ("radius", Vessel { radius: 0.0, ..vessel() }),
+            ("apex", Vessel { apex: 4.0, ..vessel() }),
+            ("top", Vessel { top: 6.0, ..vessel() }),
+            ("outlet_radius", Vessel { outlet_radius: 2.0, ..vessel() }),
+            ("outlet_length", Vessel { outlet_length: f64::NAN, ..vessel() }),
+            ("cylinder_bottom", Vessel { cylinder_bottom: f64::NAN, ..vessel() }),
+        ];
+        for (field, v) in bad {
+            assert!(matches!(v.validate(), Err(Error::Setting { name, .. }) if name == field), "{field}");
         }
     }
 
     proptest! {
-        /// So no step along what a frame leaves open of the cone leaves the valley of its likelihood.
         #[test]
-        fn a_step_of_the_cone_changes_its_radius_as_the_derivative_says(
-            slope in -0.3..0.3f64, intercept in -2.0..2.0f64, x in 0.1..1.2f64, z in 3.5..4.9f64,
-        ) {
-            let surface = silo(0.1, -0.2, 0.3, 0.4);
-            let (placed, mut step) = (PlacedSurface::new(surface), Parameters::zeros());
-            (step[5], step[6]) = (slope, intercept);
-            let at = placed.local_of(Vec3::new(x, 0.5 * x, z), Part::Cone);
-            let stepped = PlacedSurface::new(surface.stepped(&step)).local_of(at.p, Part::Cone);
-            let told = at.value + placed.derivative(&Vec3::zeros(), &at).dot(&step);
-            prop_assert!((stepped.value - told).abs() < 1e-12, "{} {told}", stepped.value);
-        }
-
-        #[test]
-        fn rays_end_on_the_wall(
-            r_x in -0.4..0.4f64, r_y in -0.4..0.4f64, t_x in -0.8..0.8f64, t_y in -0.8..0.8f64,
-            x in -0.5..0.5f64, y in -0.4..0.4f64,
-        ) {
-            let placed = PlacedSurface::new(silo(r_x, r_y, t_x, t_y));
-            let q = Vec3::new(x, y, 1.0);
-            let (d, part) = placed.depth(&q);
-            prop_assume!(d.is_finite());
-            let at = placed.local(&(q * d));
-            prop_assert!(d > 0.0 && at.part == part && at.value.abs() < 1e-7, "{d} {at:?}");
-        }
-
-        #[test]
-        fn derivatives_match_finite_differences(
-            r_x in -0.4..0.4f64, r_y in -0.4..0.4f64, t_x in -0.8..0.8f64, t_y in -0.8..0.8f64,
-            x in -0.5..0.5f64, y in -0.4..0.4f64,
-        ) {
-            let surface = silo(r_x, r_y, t_x, t_y);
-            let placed = PlacedSurface::new(surface);
-            let q = Vec3::new(x, y, 1.0);
-            let (d, part) = placed.depth(&q);
-            prop_assume!(d.is_finite());
-            let at = placed.local(&(q * d));
-            let along = at.gradient.dot(&placed.turn(&q));
-            prop_assume!(along.abs() > 1e-2);
-            let analytic = placed.derivative(&(q * d), &at);
-            let h = 1e-6;
-            for k in [0, 1, 2, 3, 4, 5, 6, 10, 11] {
-                let mut step = Parameters::zeros();
-                step[k] = h;
-                let above = PlacedSurface::new(surface.stepped(&step)).depth(&q);
-                let below = PlacedSurface::new(surface.stepped(&-step)).depth(&q);
-                prop_assume!(above.1 == part && below.1 == part);
-                let numeric = (above.0 - below.0) / (2.0 * h);
-                prop_assert!((numeric + analytic[k] / along).abs() < 1e-5 * (1.0 + numeric.abs()), "{k}: {numeric}");
-            }
+        fn volume_grows_with_the_cube_of_the_size(s in 0.1f64..10.0, z in 0.0f64..5.5) {
+            let v = Vessel { outlet_radius: 0.1, outlet_length: 0.2, ..vessel() };
+            let big = Vessel {
+                radius: s * v.radius, cylinder_bottom: s * v.cylinder_bottom, apex: s * v.apex, top: s * v.top,
+                outlet_radius: s * v.outlet_radius, outlet_length: s * v.outlet_length,
+                ..v
+            };
+            let ratio = big.volume_below(s * z) / (s * s * s);
+            prop_assert!((ratio - v.volume_below(z)).abs() < 1e-9 * (1.0 + v.volume_below(z)));
         }
     }
 }

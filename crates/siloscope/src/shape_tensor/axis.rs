@@ -3,6 +3,7 @@
 use crate::base::workers::Workers;
 use crate::shape_tensor::candidates::Candidate;
 use crate::stats::eigen;
+use crate::stats::robust::{MAD_TO_STD, median};
 use crate::{SiloPose, Vec3};
 use nalgebra::{Matrix3, Vector2};
 
@@ -59,7 +60,7 @@ pub fn consistent_direction(candidates: &[Candidate], agreement: f64) -> Consens
             let x = direction_of(&kept).x;
             let off = |c: &Candidate| c.e1.dot(&x).abs();
             if round < ROUNDS {
-                limit = agreement * 1.4826 * median(kept.iter().map(off).collect()).unwrap_or(0.0) + f64::EPSILON;
+                limit = agreement * MAD_TO_STD * median(kept.iter().map(off).collect()).unwrap_or(0.0) + f64::EPSILON;
             }
             let among = if round < ROUNDS - 1 { clearest } else { candidates.len() };
             kept = candidates[..among].iter().filter(|c| off(c) <= limit).copied().collect();
@@ -136,18 +137,4 @@ pub fn axis_point(estimates: &[AxisPoint], workers: &Workers) -> Option<Vector2<
     let median_of = |i: usize| median(estimates.iter().map(|e| e.at[i]).collect());
     let (x, y) = workers.join(|| median_of(0), || median_of(1));
     Some(Vector2::new(x?, y?))
-}
-
-/// Median of the chi-square distribution with one degree of freedom.
-pub const MEDIAN_OF_CHI_SQUARE: f64 = 0.455;
-
-/// Median; of an even number of values the mean of the middle two.
-pub fn median(mut values: Vec<f64>) -> Option<f64> {
-    let (half, even) = (values.len() / 2, values.len().is_multiple_of(2));
-    if values.is_empty() {
-        return None;
-    }
-    let (below, &mut upper, _) = values.select_nth_unstable_by(half, f64::total_cmp);
-    let lower = below.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    Some(if even { 0.5 * (lower + upper) } else { upper })
 }

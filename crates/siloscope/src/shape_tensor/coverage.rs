@@ -1,11 +1,11 @@
 //! What a frame shows about a known silo: cylinder, cone and feed, by pixels and by surface.
 
+use crate::geometry::label::Label;
 use crate::shape_tensor::profile::Profile;
 use crate::stats::voxel_grid::Cloud;
-use crate::surface_fit::segmentation::{CONE, CYLINDER, FEED, OTHER};
 use crate::{SiloPose, Vec3};
 
-/// Pixels and surface by label (`labels`), the surface in units of its own.
+/// Pixels and surface by label (`Label`), the surface in units of its own.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Coverage {
     /// Number of pixels with each label.
@@ -49,7 +49,7 @@ pub fn coverage(cloud: &Cloud, normals: &[Vec3], pose: &SiloPose, profile: &Prof
         let (off, angle) = profile.distance(rho, placed.z);
         let label = label(off, profile.is_cone(placed.z), tolerance);
         let facing = match label {
-            CYLINDER | CONE => wall_normal(&placed, rho, angle).dot(&(turn * p)),
+            Label::Cylinder | Label::Cone => wall_normal(&placed, rho, angle).dot(&(turn * p)),
             _ => normal.dot(p),
         };
         let pixels = f64::from(*count);
@@ -64,12 +64,12 @@ pub fn coverage(cloud: &Cloud, normals: &[Vec3], pose: &SiloPose, profile: &Prof
     seen
 }
 
-fn label(off: f64, cone: bool, tolerance: f64) -> u8 {
+fn label(off: f64, cone: bool, tolerance: f64) -> Label {
     match (off.abs() <= tolerance, cone) {
-        (true, false) => CYLINDER,
-        (true, true) => CONE,
-        _ if off > 0.0 => OTHER,
-        _ => FEED,
+        (true, false) => Label::Cylinder,
+        (true, true) => Label::Cone,
+        _ if off > 0.0 => Label::Other,
+        _ => Label::Feed,
     }
 }
 

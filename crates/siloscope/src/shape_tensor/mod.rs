@@ -8,6 +8,7 @@ pub mod diagnostics;
 pub mod profile;
 pub mod tensors;
 
+use crate::base::clock::Clock;
 use crate::base::refusal::Refusal;
 use crate::base::workers::Workers;
 use crate::geometry::backproject::DepthImage;
@@ -24,7 +25,6 @@ use crate::stats::neighbours::{Neighbours, nearest_neighbours};
 use crate::stats::voxel_grid::{Cloud, voxel_grid, voxel_grid_of_image};
 use crate::{Result, SiloPose, Vec3};
 use nalgebra::Matrix4;
-use std::time::Instant;
 
 /// Settings of the six steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -120,7 +120,7 @@ fn locate_in_grid(
     let first = outcomes.next().unwrap_or(Err(Refusal::NoWall));
     let outcome = first.or_else(|refusal| outcomes.find_map(Outcome::ok).ok_or(refusal));
     drop(outcomes);
-    Ok(outcome.map(|located| Located { timing: clock.laps, ..located }))
+    Ok(outcome.map(|located| Located { timing: clock.laps(), ..located }))
 }
 
 /// Steps 3 to 6.
@@ -205,25 +205,3 @@ fn covariance(found: &Found, walls: &[PlacedWall], side: f64) -> std::result::Re
 
 /// Side of the blocks whose errors are independent, in units of grid·√k: a neighbourhood's diameter.
 const BLOCK: f64 = 1.15;
-
-/// Milliseconds between the steps.
-struct Clock {
-    last: Instant,
-    laps: Vec<(&'static str, f64)>,
-}
-
-impl Clock {
-    fn start() -> Self {
-        Self { last: Instant::now(), laps: Vec::new() }
-    }
-
-    /// Adds the time since the last lap to a step's.
-    fn lap(&mut self, step: &'static str) {
-        let elapsed = self.last.elapsed().as_secs_f64() * 1e3;
-        match self.laps.iter_mut().find(|(name, _)| *name == step) {
-            Some((_, time)) => *time += elapsed,
-            None => self.laps.push((step, elapsed)),
-        }
-        self.last = Instant::now();
-    }
-}

@@ -1,11 +1,10 @@
 //! The silo's profile about a known axis: the cylinder's radius and the cone, as far as walls are seen.
 
 use crate::base::refusal::Refusal;
-use crate::geometry::vessel::Cone;
-use crate::shape_tensor::axis::median;
+use crate::geometry::surface::Cone;
 use crate::shape_tensor::candidates::View;
 use crate::stats::blocks::{blocks, sums};
-use crate::surface_fit::model_selection::FEED_SLOPE;
+use crate::stats::robust::{MAD_TO_STD, TUKEY, median};
 use crate::{SiloPose, Vec3};
 use nalgebra::{Matrix2, Vector2};
 
@@ -162,7 +161,7 @@ impl Profile {
 
     /// Whether the cone lies as flat as feed does.
     pub fn cone_may_be_feed(&self) -> bool {
-        self.cone.is_some_and(|cone| cone.slope > FEED_SLOPE)
+        self.cone.is_some_and(|cone| cone.may_be_feed())
     }
 
     /// Whether there is a wall at all, and the camera on the side from which it was seen.
@@ -193,7 +192,7 @@ impl Profile {
         let (cylinder, cone) = (self.of_part(places, false), self.of_part(places, true));
         let off = cylinder.iter().chain(&cone).map(|(p, _)| self.distance(p.rho, p.z).0.abs());
         // At most halved: a scale that falls too fast would freeze a bad start.
-        let own = 1.4826 * median(off.collect()).unwrap_or(0.0);
+        let own = MAD_TO_STD * median(off.collect()).unwrap_or(0.0);
         self.misfit = own.clamp(0.5 * self.misfit, self.misfit);
         if self.radius.is_some() {
             self.radius = weighted_mean(&cylinder).or(self.radius);
@@ -212,7 +211,7 @@ impl Profile {
     /// Tukey's weight; none for a normal that says otherwise.
     fn weight(&self, p: &Place) -> f64 {
         let (off, angle) = self.distance(p.rho, p.z);
-        let x = off / (4.685 * self.misfit.max(1e-12));
+        let x = off / (TUKEY * self.misfit.max(1e-12));
         let agrees = (p.angle - angle).abs() < 2.0 * ANGLE && x.abs() < 1.0;
         if agrees { (1.0 - x * x).powi(2) } else { 0.0 }
     }

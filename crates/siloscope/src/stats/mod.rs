@@ -4,4 +4,5 @@ pub mod blocks;
 pub mod eigen;
 pub mod nearest;
 pub mod neighbours;
+pub mod robust;
 pub mod voxel_grid;

@@ -3,7 +3,8 @@
 //! Feed that lies on the lower cone at nearly its slope, or film on a part of it, leaves a fit between both. The
 //! residuals then follow a line with a kink from top to bottom. Which of its parts is the silo's cone they don't tell.
 
-use crate::geometry::vessel::{Cone, Information, Parameters, Part};
+use crate::geometry::parameters::{Information, Parameters};
+use crate::geometry::surface::{Cone, Part};
 use crate::surface_fit::polish::TileEquation;
 use crate::surface_fit::solver::{Fit, tukey};
 use nalgebra::{Matrix3, Vector3};

@@ -84,7 +84,8 @@ impl<'a> OfTiles<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::vessel::{Parameters, Part};
+    use crate::geometry::parameters::Parameters;
+    use crate::geometry::surface::Part;
     use crate::surface_fit::solver::Equation;
     use crate::surface_fit::tiles::{DepthImage, tile_patches};
 

@@ -1,6 +1,6 @@
 //! How sure the fit is: the noise's covariance, widened by what the residuals say about the model, and the scale.
 
-use crate::geometry::vessel::{Information, OVALITY, PARAMETERS, Parameters};
+use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
 use crate::surface_fit::common::variance_of_neighbours;
 use crate::surface_fit::polish::TileEquation;
 use crate::surface_fit::solver::{Equation, Fit, Problem, System, tukey, tukey_slope};

@@ -4,7 +4,8 @@
 //! don't turn along the generatrix (k2 = 0, Property 1). A flat wall or a room's corner fails the first, the inside of
 //! a sphere the second.
 
-use crate::geometry::vessel::{Part, PlacedSurface};
+use crate::geometry::evaluator::SurfaceEvaluator;
+use crate::geometry::surface::Part;
 use crate::surface_fit::solver::Fit;
 use crate::surface_fit::tiles::{NONE, Patches};
 
@@ -77,7 +78,7 @@ struct Seat {
 const REACH: usize = 4;
 
 /// Measures the evidence on the patches with weight in `fit`.
-pub fn wall_evidence(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall: &[bool]) -> WallEvidence {
+pub fn wall_evidence(patches: &Patches, fit: &Fit, placed: &SurfaceEvaluator, wall: &[bool]) -> WallEvidence {
     let seats: Vec<Option<Seat>> = (0..patches.list.len()).map(|i| seat(patches, fit, placed, wall, i)).collect();
     let (mut turn, mut bend) = (Slope::default(), Slope::default());
     for (i, seat) in seats.iter().enumerate() {
@@ -122,7 +123,7 @@ fn wrapped(difference: f64) -> f64 {
     }
 }
 
-fn seat(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall: &[bool], i: usize) -> Option<Seat> {
+fn seat(patches: &Patches, fit: &Fit, placed: &SurfaceEvaluator, wall: &[bool], i: usize) -> Option<Seat> {
     if !wall[i] {
         return None;
     }
@@ -171,7 +172,7 @@ fn arc(azimuths: impl Iterator<Item = f64>) -> f64 {
 }
 
 /// Share of patches that lie clearly behind the wall as seen from the camera.
-fn behind(patches: &Patches, fit: &Fit, placed: &PlacedSurface, wall: &[bool]) -> f64 {
+fn behind(patches: &Patches, fit: &Fit, placed: &SurfaceEvaluator, wall: &[bool]) -> f64 {
     let list = &patches.list;
     let reach = |p: f64| 0.05 * p;
     let outside = |i: &usize| {

@@ -3,7 +3,8 @@
 //! Corrugated sheet runs around the silo or up along it: on neighbouring pixels of one of these directions it is nearly
 //! the same. Noise that grows with the incidence looks like relief by its size alone, but is another one in each pixel.
 
-use crate::geometry::vessel::{Part, PlacedSurface};
+use crate::geometry::evaluator::SurfaceEvaluator;
+use crate::geometry::surface::Part;
 use crate::surface_fit::polish::TileEquation;
 use crate::surface_fit::solver::{Fit, Problem};
 use crate::surface_fit::tiles::{DepthImage, Patch, Patches};
@@ -30,7 +31,7 @@ pub fn relief_with_grain(problem: &Problem, image: &DepthImage, fit: &Fit, tiles
     if relief == 0.0 {
         return relief;
     }
-    let placed = PlacedSurface::new(fit.surface);
+    let placed = SurfaceEvaluator::new(fit.surface);
     let of_part = |part: Part| {
         let asked: Vec<&TileEquation> = tiles.iter().filter(|tile| tile.equation.part == part).collect();
         let sketch = asked.iter().step_by(asked.len().div_ceil(SKETCH).max(1));
@@ -53,7 +54,7 @@ pub fn relief_with_grain(problem: &Problem, image: &DepthImage, fit: &Fit, tiles
 fn in_common(
     problem: &Problem,
     image: &DepthImage,
-    placed: &PlacedSurface,
+    placed: &SurfaceEvaluator,
     tile: &TileEquation,
 ) -> Option<([f64; 2], f64)> {
     let patch = &problem.patches.list[tile.patch];
@@ -129,7 +130,7 @@ fn sure_mean(values: &[(f64, f64)]) -> f64 {
 mod tests {
     use super::*;
     use crate::geometry::sensor::{DepthBias, NoiseLaw};
-    use crate::geometry::vessel::SiloSurface;
+    use crate::geometry::surface::SiloSurface;
     use crate::surface_fit::polish::{ALL, pixel_equations};
     use crate::surface_fit::solver::Prior;
     use crate::surface_fit::tiles::tile_patches;
@@ -141,7 +142,7 @@ mod tests {
         let (width, height, focal) = (320, 240, 400.0);
         let pose = SiloPose { r_x: 0.7, r_y: -0.1, t_x: 0.2, t_y: 0.1 };
         let surface = SiloSurface { pose, radius: Some(1.2), cone: None, ovality: [0.0; 2] };
-        let placed = PlacedSurface::new(surface);
+        let placed = SurfaceEvaluator::new(surface);
         let ray = |i: usize| [((i % width) as f64 - 159.5) / focal, ((i / width) as f64 - 119.5) / focal];
         let rays: Vec<[f64; 2]> = (0..width * height).map(ray).collect();
         let measured = |(i, ray): (usize, &[f64; 2])| {

@@ -1,7 +1,7 @@
 //! What the tiles' residuals need beside their noise, and how that is spread over them.
 
-use crate::geometry::vessel::Part;
-use crate::shape_tensor::axis::median;
+use crate::geometry::surface::Part;
+use crate::stats::robust::{MAD_TO_STD, median, upper_median};
 use crate::surface_fit::polish::TileEquation;
 use crate::surface_fit::solver::{Fit, tukey};
 
@@ -17,13 +17,8 @@ pub fn misfit_of(equations: &[TileEquation]) -> f64 {
         excess.push((tile.equation.residual / tile.spread).abs());
         noise.push(tile.noise / (tile.spread * tile.spread));
     }
-    if excess.is_empty() {
-        return 0.0;
-    }
-    let middle = excess.len() / 2;
-    let (_, &mut spread, _) = excess.select_nth_unstable_by(middle, f64::total_cmp);
-    let (_, &mut noise, _) = noise.select_nth_unstable_by(middle, f64::total_cmp);
-    ((1.4826 * spread).powi(2) - 1.2 * noise).max(0.0).sqrt().max(RESOLUTION)
+    let (Some(spread), Some(noise)) = (upper_median(&mut excess), upper_median(&mut noise)) else { return 0.0 };
+    ((MAD_TO_STD * spread).powi(2) - 1.2 * noise).max(0.0).sqrt().max(RESOLUTION)
 }
 
 /// The misfit with which neither part of the wall is without weight: the step before may have gone too far for one that
@@ -61,7 +56,7 @@ pub fn spread_misfit(tiles: &mut [TileEquation]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::vessel::Parameters;
+    use crate::geometry::parameters::Parameters;
     use crate::surface_fit::solver::Equation;
 
     /// Tiles from 1 to 4 units deep, seen at all angles.

@@ -22,12 +22,15 @@ pub mod warm_start;
 
 use crate::Result;
 use crate::Vec3;
+use crate::base::clock::Clock;
 use crate::base::refusal::Refusal;
 use crate::base::workers::Workers;
 use crate::fusion::frame_factor::{FrameShare, among};
-use crate::fusion::relinearize::{parameters_of, some_rays};
+use crate::fusion::relinearize::some_rays;
+use crate::geometry::evaluator::SurfaceEvaluator;
+use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
 use crate::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
-use crate::geometry::vessel::{Information, OVALITY, PARAMETERS, Parameters, PlacedSurface, Reach};
+use crate::geometry::surface::SurfaceTolerance;
 use crate::surface_fit::bow::bow_uncertainty;
 use crate::surface_fit::cloud_tiles::cloud_patches;
 use crate::surface_fit::common::lasting_misfit;
@@ -125,7 +128,7 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge, known: Option<&KnownWall>
             measured(problem, image, know, found, Looks::Usual, &mut clock)?
         }
     };
-    result.timing = clock.laps;
+    result.timing = clock.laps();
     result.patches = patches;
     Ok(result)
 }
@@ -182,7 +185,7 @@ fn measured(
 }
 
 /// So near to where they were made equations are as good as linear: what is left out is a hundredth of the step.
-const LINEAR: Reach = Reach { tilt: 0.003, shift: 0.01, radius: 0.01, slope: 0.1, apex: 0.1 };
+const LINEAR: SurfaceTolerance = SurfaceTolerance { tilt: 0.003, shift: 0.01, radius: 0.01, slope: 0.1, apex: 0.1 };
 /// So often equations are made anew where the answer is further away, as it is where a frame leaves much open.
 const MOST_ROUNDS: usize = 4;
 
@@ -223,7 +226,7 @@ const MAX_POSITION_STD: f64 = 0.05;
 impl SurfaceFit {
     /// Centres of the patches in the silo frame, freed from the depth bias: what the r–z profile shows.
     pub fn patch_points(&self) -> Vec<Vec3> {
-        let placed = PlacedSurface::new(self.fit.surface);
+        let placed = SurfaceEvaluator::new(self.fit.surface);
         let to_silo = |p: &Patch| {
             let d = if self.patches.cloud { 0.0 } else { self.fit.bias.true_depth(p.measured) };
             placed.to_silo(&p.at(d))
@@ -238,7 +241,7 @@ impl SurfaceFit {
 
     /// Whether most of the wall's normals, turned towards the origin, point to the axis.
     fn is_seen_from_inside(&self) -> bool {
-        let placed = PlacedSurface::new(self.fit.surface);
+        let placed = SurfaceEvaluator::new(self.fit.surface);
         let wall = self.residuals.iter().zip(&self.patches.list).filter(|(r, _)| r.is_finite());
         let inwards = |p: &Patch| placed.turn(&p.normal).dot(&placed.local(&p.origin).gradient) < 0.0;
         let votes: i64 = wall.map(|(_, p)| if inwards(p) { 1 } else { -1 }).sum();
@@ -279,7 +282,7 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
         Err(refusal) => return Ok(Err(refusal)),
     };
     clock.lap("covariance");
-    result.timing = clock.laps;
+    result.timing = clock.laps();
     result.patches = patches;
     result.fit.inside = result.is_seen_from_inside();
     Ok(Ok(result))
@@ -306,7 +309,11 @@ fn prior(know: &Knowledge) -> Prior {
 }
 
 /// Whether the axis is known well enough: its direction, and its position in the middle of the wall that was seen.
-fn check_determined(covariance: &Information, placed: &PlacedSurface, height: f64) -> std::result::Result<(), Refusal> {
+fn check_determined(
+    covariance: &Information,
+    placed: &SurfaceEvaluator,
+    height: f64,
+) -> std::result::Result<(), Refusal> {
     let [x, y] = placed.axis_shift(height);
     let variance = |row: &Parameters| row.dot(&(covariance * row));
     let direction = (covariance[(0, 0)] + covariance[(1, 1)]).sqrt();
@@ -327,7 +334,7 @@ fn finish(
     (evidence, wall): (WallEvidence, KnownWall),
     relief: f64,
 ) -> Outcome {
-    let base = parameters_of(&fit.surface, &fit.bias);
+    let base = fit.surface.parameters(&fit.bias);
     let system = solve_equations(problem, &mut fit, tiles, 4).ok_or(Refusal::PoorlyDetermined)?;
     let pulls: Vec<f64> = tiles.iter().map(TileEquation::pull).collect();
     let free = free_parameters(&fit, &system.prior);
@@ -340,7 +347,7 @@ fn finish(
     let film = if evidence.stuck > DENTED { off_by(form.max(FILM_FORM)) } else { Information::zeros() };
     covariance += off_by(form);
     let heights = tiles.iter().map(|t| t.equation.z).sum::<f64>();
-    let placed = PlacedSurface::new(fit.surface);
+    let placed = SurfaceEvaluator::new(fit.surface);
     check_determined(&covariance, &placed, heights / tiles.len().max(1) as f64)?;
     covariance += film + bow_uncertainty(&fit, tiles); // these widen an answer, but take none away
     if let Some(change) = change_without_a_part(&fit, &joint, (&model, &covariance), (tiles, &pulls), free[OVALITY]) {
@@ -383,22 +390,4 @@ fn residuals(tiles: &[TileEquation], n: usize) -> (Vec<f64>, f64) {
         weights += weight;
     }
     (residuals, chi / f64::max(weights, 1.0))
-}
-
-/// Milliseconds of the stages.
-struct Clock {
-    last: std::time::Instant,
-    laps: Vec<(&'static str, f64)>,
-}
-
-impl Clock {
-    fn start() -> Self {
-        Self { last: std::time::Instant::now(), laps: Vec::new() }
-    }
-
-    fn lap(&mut self, name: &'static str) {
-        let now = std::time::Instant::now();
-        self.laps.push((name, (now - self.last).as_secs_f64() * 1e3));
-        self.last = now;
-    }
 }

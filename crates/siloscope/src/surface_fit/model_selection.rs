@@ -1,8 +1,9 @@
 //! From start values to a fit on patches that stands up to the evidence.
 
 use crate::base::refusal::Refusal;
+use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
-use crate::geometry::vessel::{Part, PlacedSurface, Reach};
+use crate::geometry::surface::{FEED_SLOPE, Part, SurfaceTolerance};
 use crate::surface_fit::diagnostics::{WallEvidence, wall_evidence};
 use crate::surface_fit::outermost::{FILM, outermost, stuck};
 use crate::surface_fit::proposals::{Oriented, Start, View, other_part, starts, steeper_cone};
@@ -10,10 +11,6 @@ use crate::surface_fit::solver::{Fit, Prior, Problem};
 use crate::surface_fit::taper::cone_instead;
 use crate::surface_fit::tiles::{NONE, Patches};
 use crate::surface_fit::vertex::is_covered;
-
-/// A cone that rises less than 37.4° could as well be feed, unless feed lies in it: angles of repose go up to 36°, and
-/// a fit to feed with some wall in it may come out a little steeper.
-pub(crate) const FEED_SLOPE: f64 = 1.31;
 
 /// A fit on patches that stands up to the evidence.
 #[derive(Debug, Clone)]
@@ -103,7 +100,7 @@ fn candidates(problem: &Problem, view: View) -> Vec<(f64, Fit)> {
 
 /// Whether a start value differs from a refined one by less than start values err: it would lead to the same answer.
 fn is_near(start: &Start, fit: &Fit) -> bool {
-    const ERROR: Reach = Reach { tilt: 0.06, shift: 0.15, radius: 0.1, slope: 0.15, apex: 0.3 };
+    const ERROR: SurfaceTolerance = SurfaceTolerance { tilt: 0.06, shift: 0.15, radius: 0.1, slope: 0.15, apex: 0.3 };
     start.inside == fit.inside && start.surface.is_near(&fit.surface, &ERROR)
 }
 
@@ -125,7 +122,7 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
         wall = wall_patches(problem, &cone);
         fit = cone;
     }
-    let mut evidence = wall_evidence(problem.patches, &fit, &PlacedSurface::new(fit.surface), &wall);
+    let mut evidence = wall_evidence(problem.patches, &fit, &SurfaceEvaluator::new(fit.surface), &wall);
     evidence.stuck = stuck(problem, &fit, &wall);
     judge(&evidence, fit.inside, problem.patches.cloud)?;
     let bare = bare_part(problem, &fit, &wall);
@@ -134,7 +131,7 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
 
 /// Whether the cone could as well be feed.
 pub(crate) fn may_be_feed(problem: &Problem, fit: &Fit) -> bool {
-    fit.surface.cone.is_some_and(|c| c.slope > FEED_SLOPE) && !is_covered(problem, fit)
+    fit.surface.cone.is_some_and(|c| c.may_be_feed()) && !is_covered(problem, fit)
 }
 
 /// The fit with a steeper cone about the same axis in place of one that may be feed, or else without a cone.
@@ -215,7 +212,7 @@ fn oriented(problem: &Problem, bias: &DepthBias) -> Vec<Oriented> {
 
 /// Log-likelihood gain of calling every `stride`-th patch wall instead of anything else, where the fit says so.
 pub(crate) fn likelihood(problem: &Problem, fit: &Fit, stride: usize) -> f64 {
-    let placed = PlacedSurface::new(fit.surface);
+    let placed = SurfaceEvaluator::new(fit.surface);
     let gain = |(i, &weight): (usize, &f64)| {
         let contact = if weight > 0.0 { problem.contact(fit, &placed, i) } else { None };
         contact.map_or(0.0, |e| weight * (0.5 / (e.variance.sqrt() * e.cosine)).ln().max(0.0))
@@ -226,7 +223,7 @@ pub(crate) fn likelihood(problem: &Problem, fit: &Fit, stride: usize) -> f64 {
 /// The part of which hardly any wall patch is left, so that its parameters would be undetermined.
 fn bare_part(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Part> {
     const ENOUGH: usize = 12;
-    let placed = PlacedSurface::new(fit.surface);
+    let placed = SurfaceEvaluator::new(fit.surface);
     let (mut cylinder, mut cone) = (0, 0);
     for contact in (0..wall.len()).filter(|&i| wall[i]).filter_map(|i| problem.contact(fit, &placed, i)) {
         *(if contact.part == Part::Cylinder { &mut cylinder } else { &mut cone }) += 1;
@@ -249,7 +246,7 @@ pub fn drop_film(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
     if problem.patches.cloud || !fit.inside || fit.surface.radius.is_none() || fit.surface.cone.is_none() {
         return;
     }
-    let (placed, reach) = (PlacedSurface::new(fit.surface), FILM * fit.surface.size());
+    let (placed, reach) = (SurfaceEvaluator::new(fit.surface), FILM * fit.surface.size());
     let (mut cylinder, mut cone, mut behind) = (0, 0, 0);
     for i in (0..wall.len()).step_by(SKETCH).filter(|&i| wall[i] || problem.patches.list[i].smooth) {
         let Some(contact) = problem.contact(fit, &placed, i) else { continue };
@@ -269,7 +266,7 @@ pub fn drop_film(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
 
 /// Patches that agree with the wall and whose neighbours do too: the seam with feed or clutter is left out.
 fn wall_patches(problem: &Problem, fit: &Fit) -> Vec<bool> {
-    let placed = PlacedSurface::new(fit.surface);
+    let placed = SurfaceEvaluator::new(fit.surface);
     let agrees: Vec<bool> = (0..problem.patches.list.len())
         .map(|i| problem.contact(fit, &placed, i).is_some_and(|c| problem.weight(fit, &placed, &c, i, 0.15) > 0.2))
         .collect();

@@ -4,7 +4,7 @@
 //! wall leaves the wall proper behind itself. From there it is led outwards by an asymmetric loss, as a baseline is led
 //! under the peaks of a spectrum: what lies behind pulls twenty times as much as what lies before.
 
-use crate::geometry::vessel::PlacedSurface;
+use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::surface_fit::solver::{Contact, Equation, Fit, Problem, System, tukey};
 
 /// Thicker than any film, as a share of the silo's size.
@@ -97,7 +97,7 @@ fn alongside<'a>(
     asked: impl Fn(usize) -> bool + 'a,
 ) -> impl Iterator<Item = (usize, Contact)> + 'a {
     const PARALLEL: f64 = 0.2;
-    let (placed, reach) = (PlacedSurface::new(fit.surface), FILM * fit.surface.size());
+    let (placed, reach) = (SurfaceEvaluator::new(fit.surface), FILM * fit.surface.size());
     let list = &problem.patches.list;
     (0..list.len()).filter(move |&i| list[i].smooth && asked(i)).filter_map(move |i| {
         let contact = problem.contact(fit, &placed, i)?;
@@ -114,7 +114,7 @@ fn led_outwards(problem: &Problem, fit: &Fit) -> Option<Fit> {
     let mut outer = fit.clone();
     let mut form = (START * fit.surface.size()).max(FORM);
     for _ in 0..ROUNDS {
-        let placed = PlacedSurface::new(outer.surface);
+        let placed = SurfaceEvaluator::new(outer.surface);
         let mut system = System::with_prior(problem.prior, &outer);
         for (i, contact) in alongside(problem, &outer, |i| i.is_multiple_of(SKETCH)) {
             let variance = variance(&contact, &outer, form);

@@ -4,7 +4,8 @@
 //! that hardly differ from dents. Leaving such a part out tells it: by how much an answer that is right may change then
 //! follows from how much less is seen.
 
-use crate::geometry::vessel::{Information, OVALITY, PARAMETERS, Parameters, Part};
+use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
+use crate::geometry::surface::Part;
 use crate::surface_fit::polish::TileEquation;
 use crate::surface_fit::solver::{Fit, System, tukey};
 use std::array::from_fn;
@@ -173,8 +174,9 @@ impl Cell {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::evaluator::SurfaceEvaluator;
     use crate::geometry::sensor::DepthBias;
-    use crate::geometry::vessel::{Cone, PlacedSurface, SiloSurface};
+    use crate::geometry::surface::{Cone, SiloSurface};
     use crate::surface_fit::solver::{Equation, Prior};
     use crate::{SiloPose, Vec3};
 
@@ -190,7 +192,7 @@ mod tests {
 
     /// Equations of points all over the wall, with residuals of noise and `off`, at the answer they have by least squares.
     fn tiles(seed: f64, oval: bool, off: impl Fn(Part, Vec3) -> f64) -> Vec<TileEquation> {
-        let (fit, surface) = (fit(), PlacedSurface::new(fit().surface));
+        let (fit, surface) = (fit(), SurfaceEvaluator::new(fit().surface));
         let chance = |i: f64| (((i + seed) * 12.9898).sin() * 43_758.545_3).fract() * NOISE * 3.0_f64.sqrt();
         let of_point = |i: usize| {
             let z = 1.5 + 3.0 * (i as f64 / 3000.0);

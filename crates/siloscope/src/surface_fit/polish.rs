@@ -1,8 +1,9 @@
 //! The last steps of the fit: residuals of pixels, not tiles, against the exact wall.
 
+use crate::geometry::evaluator::SurfaceEvaluator;
+use crate::geometry::parameters::Parameters;
 use crate::geometry::sensor::NoiseLaw;
-use crate::geometry::vessel::{Parameters, PlacedSurface};
-use crate::shape_tensor::axis::{MEDIAN_OF_CHI_SQUARE, median};
+use crate::stats::robust::{MEDIAN_OF_CHI_SQUARE, median};
 use crate::surface_fit::misfit::{misfit_of, misfit_to_start_from, spread_misfit};
 use crate::surface_fit::residual::{Sampling, tile_residual};
 use crate::surface_fit::solver::{Equation, Fit, Problem, System, tukey, tukey_slope};
@@ -71,7 +72,7 @@ pub fn pixel_equations(
     thinning: &Thinning,
 ) -> Vec<TileEquation> {
     let Thinning { tiles, stride, reach } = *thinning;
-    let placed = PlacedSurface::new(fit.surface);
+    let placed = SurfaceEvaluator::new(fit.surface);
     let tile = |patch: usize| {
         let (d, _) = placed.depth(&problem.patches.list[patch].q);
         let equation = problem.equation_at(fit, &placed, patch, d)?;
@@ -110,7 +111,7 @@ fn noisier(expected: f64, scatter: f64) -> f64 {
 
 /// Equations of a cloud's wall patches from their own means.
 pub fn patch_equations(problem: &Problem, fit: &Fit, wall: &[bool]) -> Vec<TileEquation> {
-    let placed = PlacedSurface::new(fit.surface);
+    let placed = SurfaceEvaluator::new(fit.surface);
     let patch = |patch: usize| {
         let equation = problem.equation(fit, &placed, patch)?;
         let seen = &problem.patches.list[patch];
@@ -185,9 +186,7 @@ pub fn solve_equations(
         }
     }
     fit.surface = fit.surface.stepped(&total);
-    fit.bias.offset += total[7];
-    fit.bias.scale += total[8];
-    fit.bias.quadratic += total[9];
+    fit.bias = fit.bias.stepped(&total);
     Some(system)
 }
 

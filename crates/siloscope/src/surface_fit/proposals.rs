@@ -6,7 +6,7 @@
 
 use crate::Vec3;
 use crate::geometry::pose::SiloPose;
-use crate::geometry::vessel::{Cone, SiloSurface};
+use crate::geometry::surface::{Cone, SiloSurface};
 use nalgebra::Matrix3;
 
 /// A patch as the start sees it: a point, its unit normal, and how sure they are.

@@ -1,7 +1,8 @@
 //! The last step's residuals: every pixel of the wall's tiles against the exact ray–surface intersection.
 
+use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::sensor::DepthBias;
-use crate::geometry::vessel::{Part, PlacedSurface};
+use crate::geometry::surface::Part;
 use crate::surface_fit::tiles::{DepthImage, MAX_SIDE, Patch, Patches, TileRays};
 
 /// Mean residual of a tile's pixels; no count where the tile does not lie wholly on one part of the wall.
@@ -29,7 +30,7 @@ pub fn tile_residual(
     image: &DepthImage,
     patches: &Patches,
     (i, part): (usize, Part),
-    placed: &PlacedSurface,
+    placed: &SurfaceEvaluator,
     bias: &DepthBias,
     sampling: Sampling,
 ) -> TileResidual {
@@ -61,7 +62,7 @@ const QUADRATIC_REST: f64 = 5e-5;
 
 impl Tile<'_> {
     #[inline(always)]
-    fn residual(&self, placed: &PlacedSurface, part: Part, depth: impl Fn([f64; 2]) -> f64) -> TileResidual {
+    fn residual(&self, placed: &SurfaceEvaluator, part: Part, depth: impl Fn([f64; 2]) -> f64) -> TileResidual {
         let on_part = |ray: [f64; 2], d: f64| (placed.down(ray) * d < placed.bottom()) == (part == Part::Cylinder);
         let (mut nodes, mut whole) = ([0.0; 9], true);
         for (measured, ray) in nodes.iter_mut().zip(self.rays.nodes()) {
@@ -256,7 +257,7 @@ mod tests {
     use super::*;
     use crate::SiloPose;
     use crate::geometry::sensor::NoiseLaw;
-    use crate::geometry::vessel::SiloSurface;
+    use crate::geometry::surface::SiloSurface;
     use crate::surface_fit::tiles::tile_patches;
     use proptest::prelude::*;
 
@@ -290,7 +291,7 @@ mod tests {
         let (width, height, focal) = (320, 240, 280.0);
         let pose = SiloPose { r_x: 0.1, r_y: -0.05, t_x: 0.2, t_y: 0.1 };
         let surface = SiloSurface { pose, radius: Some(1.2), cone: None, ovality: [0.0; 2] };
-        let placed = PlacedSurface::new(surface);
+        let placed = SurfaceEvaluator::new(surface);
         let bias = DepthBias { offset: 0.004, scale: -0.018, quadratic: 0.022 };
         let ray = |i: usize| [((i % width) as f64 - 160.0) / focal, ((i / width) as f64 - 120.0) / focal];
         let rays: Vec<[f64; 2]> = (0..width * height).map(ray).collect();

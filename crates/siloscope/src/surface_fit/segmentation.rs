@@ -1,19 +1,10 @@
 //! Which pixel shows what: cylinder, cone, feed, or something else.
 
-use crate::geometry::vessel::{Part, PlacedSurface};
+use crate::geometry::evaluator::SurfaceEvaluator;
+use crate::geometry::label::Label;
+use crate::geometry::surface::Part;
 use crate::surface_fit::SurfaceFit;
 use crate::surface_fit::tiles::{DepthImage, Patch};
-
-/// No measurement.
-pub const NONE: u8 = 0;
-/// The cylinder.
-pub const CYLINDER: u8 = 1;
-/// The cone.
-pub const CONE: u8 = 2;
-/// Feed, and whatever else lies in front of the wall as a surface.
-pub const FEED: u8 = 3;
-/// What is no surface: dust, flying pixels, returns from behind the wall.
-pub const OTHER: u8 = 4;
 
 /// How much of a frame each label covers.
 #[derive(Debug, Clone, Default)]
@@ -26,16 +17,16 @@ pub struct Coverage {
 
 /// Labels every pixel by the fitted wall, row by row.
 pub fn label_pixels(image: &DepthImage, found: &SurfaceFit) -> Vec<u8> {
-    let placed = PlacedSurface::new(found.fit.surface);
+    let placed = SurfaceEvaluator::new(found.fit.surface);
     let pixels = (0..image.height).flat_map(|v| (0..image.width).map(move |u| (u, v)));
-    pixels.map(|at| label(image, found, &placed, at)).collect()
+    pixels.map(|at| label(image, found, &placed, at) as u8).collect()
 }
 
-fn label(image: &DepthImage, found: &SurfaceFit, placed: &PlacedSurface, (u, v): (usize, usize)) -> u8 {
+fn label(image: &DepthImage, found: &SurfaceFit, placed: &SurfaceEvaluator, (u, v): (usize, usize)) -> Label {
     let i = v * image.width + u;
     let measured = f64::from(image.depth[i]);
     if !(measured > 0.0 && measured.is_finite()) {
-        return NONE;
+        return Label::None;
     }
     let [x, y] = image.rays[i];
     let surface = has_company(image, (u, v), 0.02 * measured + 4.0 * found.noise.sigma(measured));
@@ -43,7 +34,7 @@ fn label(image: &DepthImage, found: &SurfaceFit, placed: &PlacedSurface, (u, v):
 }
 
 /// The label of a measured depth on a ray; `surface` tells whether its surroundings lie about as deep.
-fn label_of(found: &SurfaceFit, placed: &PlacedSurface, q: &crate::Vec3, measured: f64, surface: bool) -> u8 {
+fn label_of(found: &SurfaceFit, placed: &SurfaceEvaluator, q: &crate::Vec3, measured: f64, surface: bool) -> Label {
     let (wall, part) = placed.depth(q);
     let residual = measured - found.fit.bias.measured(wall);
     let sigma = found.noise.sigma(wall.min(2.0 * measured));
@@ -51,9 +42,9 @@ fn label_of(found: &SurfaceFit, placed: &PlacedSurface, q: &crate::Vec3, measure
     let cosine = (at.gradient.dot(&placed.turn(q)) / (at.gradient.norm() * q.norm())).abs().max(0.02);
     let tolerance = 4.0 * sigma + 3.0 * found.fit.misfit / cosine;
     if residual.abs() <= tolerance {
-        return if part == Part::Cylinder { CYLINDER } else { CONE };
+        return if part == Part::Cylinder { Label::Cylinder } else { Label::Cone };
     }
-    if surface && (residual <= 0.0 || residual.is_nan()) { FEED } else { OTHER }
+    if surface && (residual <= 0.0 || residual.is_nan()) { Label::Feed } else { Label::Other }
 }
 
 /// Whether at least two of the four neighbours lie about as deep.
@@ -70,24 +61,24 @@ fn has_company(image: &DepthImage, (u, v): (usize, usize), reach: f64) -> bool {
 ///
 /// A pixel at depth d with ray q covers the surface d²·|q_u × q_v| / |n·q|.
 pub fn coverage(found: &SurfaceFit) -> Coverage {
-    let placed = PlacedSurface::new(found.fit.surface);
+    let placed = SurfaceEvaluator::new(found.fit.surface);
     let mut coverage = Coverage::default();
     for (patch, rays) in found.patches.list.iter().zip(&found.patches.rays) {
         let label = label_of(found, &placed, &patch.q, patch.measured, true);
         let d = found.fit.bias.true_depth(patch.measured);
         let [along, down] = rays.steps(found.patches.side);
         let pixel = along.cross(&down).norm() * d * d;
-        coverage.counts[usize::from(label)] += patch.count;
-        coverage.areas[usize::from(label)] += patch.count * pixel / facing(label, patch, &placed, d);
+        coverage.counts[label as usize] += patch.count;
+        coverage.areas[label as usize] += patch.count * pixel / facing(label, patch, &placed, d);
     }
     coverage
 }
 
 /// |n·q| of a tile: of the fitted wall for wall pixels, of the tile's own normal for the rest.
-fn facing(label: u8, patch: &Patch, placed: &PlacedSurface, d: f64) -> f64 {
+fn facing(label: Label, patch: &Patch, placed: &SurfaceEvaluator, d: f64) -> f64 {
     let part = match label {
-        CYLINDER => Part::Cylinder,
-        CONE => Part::Cone,
+        Label::Cylinder => Part::Cylinder,
+        Label::Cone => Part::Cone,
         _ => return patch.normal.dot(&patch.q).abs().max(0.02),
     };
     let at = placed.local_of(placed.to_silo(&patch.at(d)), part);

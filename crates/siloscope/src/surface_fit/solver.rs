@@ -6,10 +6,11 @@
 //! it starts large and falls to what the agreeing patches need.
 
 use crate::Vec3;
+use crate::geometry::evaluator::{ImplicitSample, SurfaceEvaluator};
+use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
-use crate::geometry::vessel::{
-    Cone, Information, Local, OVALITY, PARAMETERS, Parameters, Part, PlacedSurface, SiloSurface,
-};
+use crate::geometry::surface::{Cone, Part, SiloSurface};
+use crate::stats::robust::{self, MAD_TO_STD, upper_median};
 use crate::surface_fit::tiles::Patches;
 
 /// What is known before the frame is looked at.
@@ -106,7 +107,7 @@ pub struct Contact {
     /// Depth of the wall where the derivative is taken, and the point there, camera frame.
     d: f64,
     p: Vec3,
-    at: Local,
+    at: ImplicitSample,
     /// Change of the residual per change of the implicit function.
     rate: f64,
 }
@@ -122,13 +123,13 @@ impl Contact {
 impl Problem<'_> {
     /// Patch `i` against the wall; `None` where its ray runs along the wall or it straddles the joint.
     #[inline(always)]
-    pub fn contact(&self, fit: &Fit, placed: &PlacedSurface, i: usize) -> Option<Contact> {
+    pub fn contact(&self, fit: &Fit, placed: &SurfaceEvaluator, i: usize) -> Option<Contact> {
         let measured = self.patches.list[i].measured;
         self.contact_at(fit, placed, i, if self.patches.cloud { 0.0 } else { fit.bias.true_depth(measured) })
     }
 
     #[inline(always)]
-    fn contact_at(&self, fit: &Fit, placed: &PlacedSurface, i: usize, d: f64) -> Option<Contact> {
+    fn contact_at(&self, fit: &Fit, placed: &SurfaceEvaluator, i: usize, d: f64) -> Option<Contact> {
         let patch = &self.patches.list[i];
         let cloud = self.patches.cloud;
         let turned = placed.turn(&patch.q);
@@ -150,7 +151,7 @@ impl Problem<'_> {
     }
 
     /// The equation of patch `i`; `None` where its ray runs along the wall or it straddles the joint.
-    pub fn equation(&self, fit: &Fit, placed: &PlacedSurface, i: usize) -> Option<Equation> {
+    pub fn equation(&self, fit: &Fit, placed: &SurfaceEvaluator, i: usize) -> Option<Equation> {
         self.contact(fit, placed, i).map(|contact| self.equation_of(placed, &contact))
     }
 
@@ -158,7 +159,7 @@ impl Problem<'_> {
     ///
     /// With d on the wall, neither the derivative nor the variance depends on the noise of the patch itself. That
     /// matters: a derivative that carries the residual's own noise pulls the answer along weakly determined directions.
-    pub fn equation_at(&self, fit: &Fit, placed: &PlacedSurface, i: usize, d: f64) -> Option<Equation> {
+    pub fn equation_at(&self, fit: &Fit, placed: &SurfaceEvaluator, i: usize, d: f64) -> Option<Equation> {
         self.contact_at(fit, placed, i, d).map(|contact| self.equation_of(placed, &contact))
     }
 
@@ -166,7 +167,7 @@ impl Problem<'_> {
     ///
     /// The bias trades against the pose along a weak direction, in which the noise in derivatives outweighs the frame.
     #[inline(always)]
-    pub fn stable_equation(&self, fit: &Fit, placed: &PlacedSurface, contact: &Contact, i: usize) -> Equation {
+    pub fn stable_equation(&self, fit: &Fit, placed: &SurfaceEvaluator, contact: &Contact, i: usize) -> Equation {
         if self.patches.cloud || self.prior.bias_std[2] == 0.0 {
             return self.equation_of(placed, contact);
         }
@@ -177,7 +178,7 @@ impl Problem<'_> {
     }
 
     #[inline]
-    fn equation_of(&self, placed: &PlacedSurface, contact: &Contact) -> Equation {
+    fn equation_of(&self, placed: &SurfaceEvaluator, contact: &Contact) -> Equation {
         let Contact { residual, variance, cosine, part, d, p, at, rate, .. } = *contact;
         let mut jacobian = placed.derivative(&p, &at) * rate;
         if !self.patches.cloud {
@@ -190,7 +191,7 @@ impl Problem<'_> {
 
     /// Robust weight of patch `i`: by residual and by normal, which may be `angle` off beside its own uncertainty.
     #[inline]
-    pub fn weight(&self, fit: &Fit, placed: &PlacedSurface, contact: &Contact, i: usize, angle: f64) -> f64 {
+    pub fn weight(&self, fit: &Fit, placed: &SurfaceEvaluator, contact: &Contact, i: usize, angle: f64) -> f64 {
         let patch = &self.patches.list[i];
         let by_residual = tukey(contact.residual * contact.residual / contact.variance);
         if by_residual <= 0.0 || !patch.smooth {
@@ -201,7 +202,7 @@ impl Problem<'_> {
 
     /// Robust weight of patch `i` by its normal alone, 0 to 1.
     #[inline(always)]
-    pub fn agreement(&self, fit: &Fit, placed: &PlacedSurface, contact: &Contact, i: usize, angle: f64) -> f64 {
+    pub fn agreement(&self, fit: &Fit, placed: &SurfaceEvaluator, contact: &Contact, i: usize, angle: f64) -> f64 {
         let patch = &self.patches.list[i];
         let facing = placed.turn(&patch.normal).dot(&contact.at.gradient) / contact.at.gradient.norm();
         let agreement = match (self.patches.cloud, fit.inside) {
@@ -222,7 +223,7 @@ impl Problem<'_> {
     }
 
     fn step(&self, fit: &mut Fit, stride: usize, angle: f64) {
-        let placed = PlacedSurface::new(fit.surface);
+        let placed = SurfaceEvaluator::new(fit.surface);
         let mut system = System::with_prior(self.prior, fit);
         let bias_is_pinned = self.prior.bias_std == [0.0; 3] && self.prior.ovality_std == 0.0;
         let mut across: Vec<f64> = Vec::with_capacity(self.patches.list.len() / stride + 1);
@@ -263,25 +264,19 @@ impl Problem<'_> {
 /// Tukey's weight for a squared residual in units of its variance.
 #[inline]
 pub fn tukey(squared: f64) -> f64 {
-    let t = 1.0 - squared / (TUKEY * TUKEY);
-    if t <= 0.0 { 0.0 } else { t * t }
+    robust::tukey_weight(squared, TUKEY)
 }
 
 /// Derivative of residual × weight by the residual, for a squared residual in units of its variance.
 #[inline]
 pub fn tukey_slope(squared: f64) -> f64 {
-    let t = squared / (TUKEY * TUKEY);
-    if t >= 1.0 { 0.0 } else { (1.0 - t) * (1.0 - 5.0 * t) }
+    robust::tukey_slope(squared, TUKEY)
 }
 
 /// What the agreeing patches' distances from the wall need beside the noise; at most halves in one step.
 fn next_misfit(now: f64, across: &mut [f64], noise: f64) -> f64 {
-    if across.is_empty() {
-        return now;
-    }
-    let middle = across.len() / 2;
-    let (_, &mut median, _) = across.select_nth_unstable_by(middle, f64::total_cmp);
-    let spread = 1.4826 * median;
+    let Some(median) = upper_median(across) else { return now };
+    let spread = MAD_TO_STD * median;
     (spread * spread - noise).max(0.0).sqrt().clamp(now * 0.4, now).max(MISFIT_FLOOR)
 }
 
@@ -304,9 +299,7 @@ impl Fit {
             (step[5], step[6]) = (slope - cone.slope, slope * apex - cone.intercept());
         }
         self.surface = self.surface.stepped(&step);
-        self.bias.offset += step[7];
-        self.bias.scale += step[8];
-        self.bias.quadratic += step[9];
+        self.bias = self.bias.stepped(&step);
     }
 }
 

@@ -1,6 +1,6 @@
 //! Cylinder or cone? A small piece of a cone looks like a cylinder about another axis.
 
-use crate::geometry::vessel::{Cone, SiloSurface};
+use crate::geometry::surface::{Cone, SiloSurface};
 use crate::surface_fit::model_selection::{likelihood, may_be_feed};
 use crate::surface_fit::solver::{Fit, Problem};
 use crate::surface_fit::tiles::Patch;

@@ -5,7 +5,7 @@
 
 use crate::Vec3;
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
-use crate::shape_tensor::axis::{MEDIAN_OF_CHI_SQUARE, median};
+use crate::stats::robust::{MAD_TO_STD, MEDIAN_OF_CHI_SQUARE, median, upper_median};
 
 /// A small piece of surface.
 #[derive(Debug, Clone, Copy)]
@@ -347,9 +347,7 @@ fn robust_tile(image: &DepthImage, (u0, v0): (usize, usize), side: usize) -> Opt
     for _ in 0..3 {
         let mut residuals: Vec<f64> =
             pixels.iter().map(|p| (p.2 - plane.a - plane.b * p.0 - plane.c * p.1).abs()).collect();
-        let middle = residuals.len() / 2;
-        let (_, &mut median, _) = residuals.select_nth_unstable_by(middle, f64::total_cmp);
-        let limit = (3.0 * 1.4826 * median).max(1e-4);
+        let limit = (3.0 * MAD_TO_STD * upper_median(&mut residuals)?).max(1e-4);
         let mut sums = Sums::default();
         for p in pixels {
             if (p.2 - plane.a - plane.b * p.0 - plane.c * p.1).abs() <= limit {
@@ -371,14 +369,10 @@ fn quadrant_plane(pixels: &[(f64, f64, f64)]) -> Option<Plane> {
     for quadrant in 0..4 {
         let inside = |p: &&(f64, f64, f64)| usize::from(p.0 > 0.0) + 2 * usize::from(p.1 > 0.0) == quadrant;
         let mut z: Vec<f64> = pixels.iter().filter(inside).map(|p| p.2).collect();
-        if z.is_empty() {
-            continue;
-        }
+        let Some(median) = upper_median(&mut z) else { continue };
         let n = z.len() as f64;
         let u = pixels.iter().filter(inside).map(|p| p.0).sum::<f64>() / n;
         let v = pixels.iter().filter(inside).map(|p| p.1).sum::<f64>() / n;
-        let middle = z.len() / 2;
-        let (_, &mut median, _) = z.select_nth_unstable_by(middle, f64::total_cmp);
         sums.add(u, v, median);
     }
     if sums.n < 3.0 { None } else { sums.plane() }

@@ -1,6 +1,7 @@
 //! What lies before a cone's vertex, and so whether the cone could be feed itself.
 
-use crate::geometry::vessel::{Part, PlacedSurface};
+use crate::geometry::evaluator::SurfaceEvaluator;
+use crate::geometry::surface::Part;
 use crate::surface_fit::solver::{Fit, Problem};
 use crate::surface_fit::tiles::Patch;
 
@@ -42,7 +43,7 @@ fn before_the_cone(problem: &Problem, fit: &Fit) -> Vec<Before> {
     if problem.patches.cloud {
         return Vec::new();
     }
-    let (placed, size) = (PlacedSurface::new(fit.surface), fit.surface.size());
+    let (placed, size) = (SurfaceEvaluator::new(fit.surface), fit.surface.size());
     let before = |patch: &Patch| {
         let (d, part) = placed.depth(&patch.q);
         let p = placed.to_silo(&(patch.q * d));

@@ -4,7 +4,7 @@
 //! confirm the known wall: whatever is new, lost, moved, or hard to see sends the frame back to the search.
 
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
-use crate::geometry::vessel::{Reach, SiloSurface};
+use crate::geometry::surface::{SiloSurface, SurfaceTolerance};
 use crate::surface_fit::model_selection::{Settled, settled, with_free_size};
 use crate::surface_fit::solver::{Fit, Prior, Problem};
 use crate::surface_fit::tiles::Patches;
@@ -29,7 +29,7 @@ const LEAST_SHARE: f64 = 0.35;
 /// Most misfit where the depth's bend is fitted too, as a share of the silo's size: a rough wall and a bent depth trade.
 const MOST_MISFIT: f64 = 1e-3;
 /// How far the wall may be from the known one.
-const SAME: Reach = Reach { tilt: 0.01, shift: 0.03, radius: 0.03, slope: 0.05, apex: 0.06 };
+const SAME: SurfaceTolerance = SurfaceTolerance { tilt: 0.01, shift: 0.03, radius: 0.03, slope: 0.05, apex: 0.06 };
 /// Misfit of the first step as a multiple of the known one: it can only fall, and what agrees must not depend on it.
 const LOOSER: f64 = 6.0;
 
