@@ -13,9 +13,10 @@ from hypothesis import strategies as st
 import silos
 import siloscope
 from silos import known, measured, noisy, percent, scene
-from siloscope.content import QUALITY, Datasheet
+from siloscope.content import Datasheet
 from siloscope.content.knowledge import know
 from siloscope.errors import InputError, UsageError
+from siloscope.reasons import CONTENT_REMARKS
 from siloscope.simulation import ASTRA_S, PERFECT, Defects, Feed, Silo, defects
 from siloscope.simulation.scenarios import random_scene
 
@@ -430,12 +431,12 @@ CASES = {
 
 
 class TestQuality:
-    @pytest.mark.parametrize("code", QUALITY)
+    @pytest.mark.parametrize("code", CONTENT_REMARKS)
     def test_every_code_has_a_case_that_shows_it(self, code: str) -> None:
         content = CASES[code]()
         assert content.has(code), (content.status, content.quality)
         remark = next(r for r in content.quality if r.code == code)
-        assert remark.message == QUALITY[code][0]
+        assert remark.message == CONTENT_REMARKS[code][0]
         assert remark.to_dict()["advice"]
         if remark.refuses:
             assert content.status == "refused"

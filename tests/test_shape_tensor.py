@@ -98,7 +98,7 @@ def test_what_shows_no_wall_is_refused(world: str, sensor: str) -> None:
     estimate, _ = locate(scene if sensor == "perfect" else replace(scene, sensor=NOISE, seed=2))
     assert estimate.status == "refused"
     assert estimate.pose is None
-    assert estimate.reason in siloscope.estimation.surface.reasons()
+    assert estimate.reason in siloscope.reasons.estimate_refusals()
     assert estimate.message
 
 

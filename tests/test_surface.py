@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from siloscope import Camera, Estimate, SiloPose, sensors
-from siloscope.estimation.surface import fit_depth, reasons
+from siloscope.estimation.surface import fit_depth
+from siloscope.reasons import estimate_refusals
 from siloscope.reproduction.discharges import real
 from siloscope.sensors import SensorProfile
 from siloscope.simulation import (
@@ -337,7 +338,7 @@ def test_a_funnel_of_feed_below_an_auger_is_not_taken_for_the_cone(seed: int) ->
 
 
 def test_every_reason_has_a_meaning_and_advice() -> None:
-    for slug, (meaning, advice) in reasons().items():
+    for slug, (meaning, advice) in estimate_refusals().items():
         assert slug == slug.lower()
         assert len(meaning) > 20
         assert len(advice) > 20

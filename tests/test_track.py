@@ -17,7 +17,8 @@ from siloscope.errors import InputError, UsageError
 from siloscope.simulation import Feed
 from siloscope.track import _told
 from siloscope.tracking.events import legs
-from siloscope.tracking.story import DAY, Moment, utc
+from siloscope.tracking.story import Moment
+from siloscope.types.track import DAY, utc
 
 START = 1_772_000_000.0
 

@@ -50,14 +50,14 @@ def _help(command: str) -> str:
 
 def reasons() -> str:
     """Every reason for which a frame is refused."""
-    from siloscope.estimation.surface import reasons as known
+    from siloscope.reasons import estimate_refusals as known
 
     return _advice(known())
 
 
 def calibration_reasons() -> str:
     """Every reason for which there is no calibration."""
-    return _advice(import_module("siloscope.calibrate").REASONS)
+    return _advice(import_module("siloscope.reasons").CALIBRATION_REFUSALS)
 
 
 def _advice(known: dict[str, tuple[str, str]]) -> str:
@@ -67,16 +67,16 @@ def _advice(known: dict[str, tuple[str, str]]) -> str:
 
 def quality() -> str:
     """Every remark on a calibration."""
-    from siloscope.types.calibration import QUALITY
+    from siloscope.reasons import CALIBRATION_REMARKS
 
-    return _meanings("code", QUALITY)
+    return _meanings("code", CALIBRATION_REMARKS)
 
 
 def frame_statuses() -> str:
     """What may become of a frame in a calibration."""
-    from siloscope.types.calibration import STATUSES
+    from siloscope.reasons import FRAME_STATUSES
 
-    return _meanings("status", STATUSES)
+    return _meanings("status", FRAME_STATUSES)
 
 
 def _meanings(head: str, known: dict[str, str]) -> str:
@@ -94,11 +94,11 @@ def sensors() -> str:
 
 def content_quality() -> str:
     """Every remark on a reading of the content."""
-    from siloscope.content.quality import QUALITY, REFUSING
+    from siloscope.reasons import CONTENT_REFUSALS, CONTENT_REMARKS
 
     rows = [
-        f"| `{code}` | {meaning} | {advice} | {'may leave no answer' if code in REFUSING else ''} |"
-        for code, (meaning, advice) in QUALITY.items()
+        f"| `{code}` | {meaning} | {advice} | {'may leave no answer' if code in CONTENT_REFUSALS else ''} |"
+        for code, (meaning, advice) in CONTENT_REMARKS.items()
     ]
     return "\n".join(["| code | what it means | what to do | |", "|---|---|---|---|", *rows])
 

@@ -8,12 +8,13 @@ from siloscope.io import open
 from siloscope.locate import locate
 from siloscope.measure import measure
 from siloscope.track import track
-from siloscope.tracking.story import Track
 from siloscope.types.calibration import Calibration
 from siloscope.types.camera import Camera
-from siloscope.types.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.types.estimate import Estimate, Ratios
 from siloscope.types.frame import Frame
 from siloscope.types.pose import SiloPose
+from siloscope.types.track import Track
+from siloscope.types.vessel import SiloGeometry
 
 __all__ = [
     "Calibration",

@@ -17,20 +17,24 @@ from numpy.typing import ArrayLike
 
 from siloscope import sensors
 from siloscope.errors import InputError, UsageError
-from siloscope.estimation.surface import PARAMETERS, SurfaceEvidence, geometry
+from siloscope.estimation.surface import geometry
 from siloscope.estimation.thinning import thinned
-from siloscope.fusion.change_point import Move, find_moves, may_have_moved
+from siloscope.fusion.change_point import find_moves, may_have_moved
 from siloscope.fusion.relinearize import at_bias, bias_is_free, straightened
-from siloscope.fusion.solve import Fused, Stack, Sums, fuse, sums
+from siloscope.fusion.solve import Fused, Stack, fuse, sums
 from siloscope.io import FrameSource
 from siloscope.io import open as open_frames
 from siloscope.locate import locate
+from siloscope.reasons import CALIBRATION_REFUSALS, sentence
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration, Evidence, FrameRecord
 from siloscope.types.camera import Camera
-from siloscope.types.estimate import Estimate, SiloGeometry
+from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
+from siloscope.types.frame_factor import PARAMETERS, FrameFactor, SummedFactor
+from siloscope.types.move import Move
 from siloscope.types.pose import SiloPose
+from siloscope.types.vessel import SiloGeometry
 
 RULES = ("information", "mean-of-last-10")
 """How frames become one: weighed by their information, or the mean of the last 10 answers (section 2.4.4)."""
@@ -47,21 +51,6 @@ MAX_POSITION_STD = 0.05
 MANY = 0.25
 """Share of the frames that are many when they disagree with the rest."""
 
-REASONS = {
-    "no-frame-answers": (
-        "none of the frames shows enough wall",
-        "take frames at a lower level, or turn the camera so that more of the wall is in view",
-    ),
-    "frames-disagree": (
-        "the frames' answers scatter too far to be of one camera in one silo",
-        "check that all frames are of one camera in one silo, and what each of them says",
-    ),
-    "poorly-determined": (
-        "the frames agree, but together they show too little wall to fix the axis",
-        "go on with frames at a lower level, or turn the camera so that more of the wall is in view",
-    ),
-}
-"""Why there is no calibration: what it means, and what to try."""
 
 SEARCHED = 16
 """Of so many frames one is searched for the wall; the others look for it first where such a frame has shown it."""
@@ -109,7 +98,7 @@ def calibrate(
     Returns
     -------
     Calibration
-        With status ``refused`` and a reason of `REASONS` where no frame shows enough wall.
+        With status ``refused`` and a reason of `CALIBRATION_REFUSALS` where no frame shows enough wall.
 
     Raises
     ------
@@ -322,8 +311,8 @@ class _History:
     """All frames so far: a record of each, and the evidence of those that can still be fused."""
 
     records: tuple[FrameRecord, ...] = ()
-    evidence: tuple[tuple[int, SurfaceEvidence], ...] = ()
-    earlier: Sums | None = None
+    evidence: tuple[tuple[int, FrameFactor], ...] = ()
+    earlier: SummedFactor | None = None
     moves: tuple[Move, ...] = ()
 
     @classmethod
@@ -524,7 +513,7 @@ def _stamped(record: FrameRecord, status: str, weight: float) -> FrameRecord:
     return replace(record, status=status, weight=weight, deviation=None)
 
 
-def _mean_geometry(evidence: list[SurfaceEvidence]) -> SiloGeometry:
+def _mean_geometry(evidence: list[FrameFactor]) -> SiloGeometry:
     """Mean radius and apex of the frames that show them, and the cylinder's bottom from their mean cone."""
     if not evidence:
         return SiloGeometry()
@@ -537,8 +526,7 @@ def _mean_geometry(evidence: list[SurfaceEvidence]) -> SiloGeometry:
 
 
 def _refused(reason: str, history: _History, rule: str, config: dict[str, Any]) -> Calibration:
-    meaning, advice = REASONS[reason]
-    message = f"{meaning[0].upper()}{meaning[1:]}{_commonest(history)}; {advice}."
+    message = sentence(CALIBRATION_REFUSALS[reason], _commonest(history))
     evidence = Evidence(history.evidence[-KEPT:], history.earlier)
     return Calibration(
         "refused", rule, moves=history.moves, frames=history.records, reason=reason, message=message, config=config,

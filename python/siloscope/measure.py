@@ -17,13 +17,13 @@ from siloscope.content.capacity import LONGEST, Datasheet, Strapping
 from siloscope.content.density import Density, choose
 from siloscope.content.knowledge import WALL_STD, Knowledge, know, narrowed
 from siloscope.content.reading import Request, content_of, lengths_for_core, source_of
-from siloscope.content.result import Content
 from siloscope.errors import InputError, UsageError
 from siloscope.estimation.inputs import Prepared, prepare
 from siloscope.locate import locate
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
 from siloscope.types.camera import Camera
+from siloscope.types.content import Content
 from siloscope.types.frame import Frame
 
 BEHIND = 1.5

@@ -14,10 +14,11 @@ from siloscope.io import FrameSource
 from siloscope.io import open as open_frames
 from siloscope.measure import measure
 from siloscope.tracking.events import events
-from siloscope.tracking.story import Moment, Reading, Track
+from siloscope.tracking.story import Moment
 from siloscope.tracking.use import use
 from siloscope.types.calibration import Calibration
 from siloscope.types.frame import Frame
+from siloscope.types.track import Reading, Track
 
 TOGETHER = 120.0
 """Seconds between two frames that still tell whether the content moves while they are taken."""

@@ -15,7 +15,8 @@ from siloscope.cli.outcome import PARTIAL, REFUSED, check_place, print_json, wri
 from siloscope.cli.progress import say, track
 from siloscope.cli.summary import headline, pose_table, silo_line, tilt_line
 from siloscope.io import FrameSource
-from siloscope.types.calibration import QUALITY, Calibration
+from siloscope.reasons import CALIBRATION_REMARKS
+from siloscope.types.calibration import Calibration
 
 
 def calibrate(
@@ -96,7 +97,7 @@ def _print(found: Calibration, out: Path) -> None:
     for line in (tilt_line(found), silo_line(found.silo, found.silo_std)):
         console.print(line, markup=False)
     for code in found.quality:
-        say(f"{code}: {QUALITY[code]}{_when(found) if code == 'camera-moved' else ''}")
+        say(f"{code}: {CALIBRATION_REMARKS[code]}{_when(found) if code == 'camera-moved' else ''}")
 
 
 def _tell_left_out(found: Calibration) -> None:

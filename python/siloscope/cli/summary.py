@@ -9,7 +9,8 @@ from rich.table import Table
 from rich.text import Text
 
 from siloscope.types.calibration import Calibration
-from siloscope.types.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.types.estimate import Estimate, Ratios
+from siloscope.types.vessel import SiloGeometry
 from siloscope.wording import with_std
 
 _ROWS = (

@@ -21,7 +21,7 @@ from siloscope.cli.progress import track as bar
 from siloscope.errors import UsageError
 from siloscope.io import FrameSource
 from siloscope.schema import documents
-from siloscope.tracking.story import Reading, Track
+from siloscope.types.track import Reading, Track
 from siloscope.wording import counted, with_std
 
 SHOWN = 40

@@ -2,12 +2,11 @@
 
 from siloscope.content.capacity import Datasheet, Strapping
 from siloscope.content.density import Density, products
-from siloscope.content.quality import QUALITY, Remark
-from siloscope.content.result import Content, Level, Parts
-from siloscope.content.surface_map import Shape, SurfaceMap, surface_map, volume_between
+from siloscope.content.surface_map import surface_map, volume_between
+from siloscope.types.content import Content, Level, Parts, Remark
+from siloscope.types.surface_map import Shape, SurfaceMap
 
 __all__ = [
-    "QUALITY",
     "Content",
     "Datasheet",
     "Density",

@@ -7,12 +7,11 @@ import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from siloscope.errors import InputError, UsageError
-from siloscope.types.estimate import SiloGeometry
+from siloscope.types.vessel import Lengths, SiloGeometry
 
 LARGEST_FILE = 10_000_000
 """Bytes of a strapping table."""
@@ -125,27 +124,6 @@ def _pair(cells: list[str], decimal_comma: bool) -> tuple[float, float] | None:
     return (numbers[0], numbers[1]) if len(numbers) == 2 and all(map(math.isfinite, numbers)) else None
 
 
-@dataclass(frozen=True)
-class Lengths:
-    """A silo's lengths for measuring: what was calibrated, completed by a datasheet. z as in `SiloGeometry`."""
-
-    geometry: SiloGeometry
-    top: float
-    """z of the silo's upper edge."""
-    top_from: str
-    """Where `top` comes from: "datasheet", "given", or "camera" for the camera's own height."""
-    assumed: tuple[str, ...]
-    """What was taken from elsewhere than the calibration, in words."""
-    added_variance: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """What the datasheet adds to the variance of radius, cylinder_bottom and apex, m²."""
-    bottom_from: str = "wall"
-    """Where `cylinder_bottom` comes from: "wall" where cone and cylinder meet, "vertex", or "top"."""
-    apex_from: str = "wall"
-    """Where `apex` comes from: "wall", or "bottom" for the cylinder's bottom."""
-    cone_only: bool = False
-    """Whether nobody knows the cylinder, so that `geometry` is the cone continued up to the camera."""
-
-
 def complete(seen: SiloGeometry, sheet: Datasheet, top: float | None) -> Lengths:
     """Fills what was not seen from the datasheet; what was seen stays."""
     radius, bottom, apex = seen.radius, seen.cylinder_bottom, seen.apex
@@ -184,9 +162,3 @@ def _top(bottom: float | None, sheet: Datasheet, top: float | None) -> tuple[flo
 def missing(geometry: SiloGeometry) -> tuple[str, ...]:
     """Names of the lengths that a volume needs and nobody knows."""
     return tuple(name for name in ("radius", "cylinder_bottom", "apex") if getattr(geometry, name) is None)
-
-
-def to_plain(lengths: Lengths) -> dict[str, Any]:
-    """Plain data for a result's ``silo``."""
-    geometry = SiloGeometry(apex=lengths.geometry.apex) if lengths.cone_only else lengths.geometry
-    return {**geometry.to_dict(), "top": lengths.top, "top_from": lengths.top_from}

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import sensors
-from siloscope.content.capacity import Datasheet, Lengths, complete
+from siloscope.content.capacity import Datasheet, complete
 from siloscope.errors import InputError, UsageError
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
-from siloscope.types.estimate import SiloGeometry
 from siloscope.types.pose import SiloPose
+from siloscope.types.vessel import Lengths, SiloGeometry
 
 PARAMETERS = ("r_x", "r_y", "t_x", "t_y", "radius", "cylinder_bottom", "apex", "offset", "scale", "quadratic")
 """Order of the covariance; the last three are the sensor's depth bias."""

@@ -2,61 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-QUALITY: dict[str, tuple[str, str]] = {
-    "too-little-seen": (
-        "too little of the content's surface is seen to tell how much there is",
-        "clean the lens, free the view, or turn the camera so that it looks at the middle of the silo",
-    ),
-    "partly-seen": (
-        "less than a third of the surface is seen; the rest is continued from its slope",
-        "mind the larger deviation; a camera farther from the wall or with a wider view sees more",
-    ),
-    "sensor-buried": (
-        "nearly everything measured is far nearer than the sensor can measure",
-        "look whether the sensor is buried in feed, caked, or covered, and measure again when it is free",
-    ),
-    "dust-or-fog": (
-        "many single returns float between sensor and surface, as dust or fog make them",
-        "measure again when filling is over and the dust has settled",
-    ),
-    "lens-film": (
-        "large parts of the picture that should show the silo within the sensor's range show nothing",
-        "clean the window; in a cold silo warm it against condensation",
-    ),
-    "obstruction": (
-        "something hangs or stands between sensor and surface",
-        "look what it is; the surface behind it is continued from around it",
-    ),
-    "stuck-feed": (
-        "feed hangs on the wall above the surface",
-        "its volume is not counted; knock the silo free, and look for a bridge",
-    ),
-    "rathole": (
-        "the surface has a steep hole",
-        "the flow comes through a pipe in the feed; it may collapse at once, keep out and have it broken up",
-    ),
-    "filling-in-progress": (
-        "the surface moved since the frame before",
-        "measure again when filling or emptying is over; this reading belongs to its own moment",
-    ),
-    "camera-moved": (
-        "the wall no longer lies where the calibration has it",
-        "calibrate anew with frames taken since the camera was moved",
-    ),
-    "below-the-floor": (
-        "much of what is seen lies below the silo's floor",
-        "check that calibration and frame are of one silo and one camera",
-    ),
-}
-"""Code: what it means, what to do."""
-
-REFUSING = ("too-little-seen", "sensor-buried", "camera-moved", "below-the-floor")
-"""Codes that may leave a reading without an answer; the others come beside one."""
+from siloscope.types.content import Remark
 
 LEAST_COVERAGE = 0.05
 """Share of the surface that must be seen."""
@@ -84,32 +34,6 @@ MATTERS = 3.0
 """A move of the camera refuses the reading where it changes the volume by so many standard deviations."""
 MOVING = 4.0
 """Standard deviations of the difference between two frames' volumes that is a movement."""
-
-
-@dataclass(frozen=True)
-class Remark:
-    """A code of `QUALITY` with what was seen."""
-
-    code: str
-    seen: str
-    """The figures that led to it, in words."""
-    refuses: bool = False
-    """Whether it leaves the reading without an answer."""
-
-    @property
-    def message(self) -> str:
-        """What it means."""
-        return QUALITY[self.code][0]
-
-    @property
-    def advice(self) -> str:
-        """What to do."""
-        return QUALITY[self.code][1]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return {"code": self.code, "message": self.message, "advice": self.advice, "seen": self.seen,
-                "refuses": self.refuses}  # fmt: skip
 
 
 def remarks(found: dict[str, Any], coverage: float | None, capacity: float | None, area: float) -> list[Remark]:

@@ -14,11 +14,11 @@ from siloscope.content import quality
 from siloscope.content.capacity import Datasheet, Strapping, missing
 from siloscope.content.density import Density
 from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge
-from siloscope.content.quality import QUALITY, Remark
-from siloscope.content.result import Content, Level, Parts
-from siloscope.content.surface_map import Shape, SurfaceMap
 from siloscope.errors import InputError, UsageError
+from siloscope.reasons import CONTENT_REMARKS, sentence
+from siloscope.types.content import Content, Level, Parts, Remark
 from siloscope.types.frame import Frame
+from siloscope.types.surface_map import Shape, SurfaceMap
 
 FEWEST = 3
 """Fewer cells than this that seem to show content on an otherwise bare floor are no content."""
@@ -150,8 +150,7 @@ def _lacking(known: Knowledge, found: dict[str, Any]) -> tuple[str, ...]:
 
 
 def _refused(remark: Remark, frame: dict[str, Any]) -> Content:
-    meaning, advice = QUALITY[remark.code]
-    message = f"{meaning[0].upper()}{meaning[1:]} ({remark.seen}); {advice}."
+    message = sentence(CONTENT_REMARKS[remark.code], f" ({remark.seen})")
     return Content("refused", remark.code, message, **frame)
 
 

@@ -12,8 +12,9 @@ from siloscope import _core
 from siloscope.estimation import steps
 from siloscope.estimation.surface import cell_size, refused
 from siloscope.types.camera import Camera
-from siloscope.types.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.types.estimate import Estimate, Ratios
 from siloscope.types.pose import SiloPose
+from siloscope.types.vessel import SiloGeometry
 
 METHOD = "shape-tensor"
 

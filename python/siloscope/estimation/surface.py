@@ -3,24 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
+from siloscope.reasons import estimate_refusals, sentence
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import Camera
-from siloscope.types.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.types.estimate import Estimate, Ratios, SurfaceDetails
+from siloscope.types.frame_factor import PARAMETERS, FrameFactor
 from siloscope.types.pose import SiloPose
-
-PARAMETERS = (
-    *("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "cone_intercept"),
-    *("offset", "scale", "quadratic", "oval_cos", "oval_sin"),
-)
-"""Order of the parameters: pose; radius; cone (its radius b − m·z: slope m, intercept b); depth bias; ovality."""
+from siloscope.types.vessel import SiloGeometry
 
 OVALITY = PARAMETERS.index("oval_cos")
 
@@ -29,61 +24,6 @@ DIAMETER_STD = 0.002
 
 GRAVITY_STD = 0.01
 """Standard deviation of an accelerometer's direction at rest, rad (Table 7 of the paper: 5 to 12 mrad)."""
-
-
-@dataclass(frozen=True, eq=False)
-class SurfaceEvidence:
-    """What one frame says about all parameters, without priors: what `calibrate` fuses.
-
-    Vectors are (12,) in the order of `PARAMETERS`, matrices (12, 12). Near `parameters` the frame's negative
-    log-likelihood is ``gradient @ δ + δ @ information @ δ / 2``. What was known before the frame (sensor profile,
-    diameter, gravity) stands beside it, because it is common to all frames.
-    """
-
-    parameters: NDArray[np.float64]
-    """The answer with the silo's ovality estimated; NaN where a part was not seen."""
-    information: NDArray[np.float64]
-    """Information of this frame alone."""
-    gradient: NDArray[np.float64]
-    """Gradient of this frame's negative log-likelihood at `parameters`."""
-    scatter: NDArray[np.float64]
-    """Covariance of `gradient` as the residuals have it."""
-    noise: NDArray[np.float64]
-    """The part of `scatter` that the sensor's noise makes; the rest (the wall's own shape, the lens) may come back."""
-    free: NDArray[np.bool_]
-    """Which parameters were estimated."""
-    prior_mean: NDArray[np.float64]
-    """What was expected before; NaN where nothing was."""
-    prior_information: NDArray[np.float64]
-    """How firmly, as 1/variance; 0 where nothing was expected."""
-    scale_std: float
-    """Standard deviation of the depth scale where no frame can tell it, else 0."""
-    base: NDArray[np.float64]
-    """Where the frame's equations were made, near `parameters`; NaN where they are."""
-    rays: NDArray[np.float64]
-    """(K, 3): (x, y) of rays (x, y, 1) to some of the wall that was seen, and their information, 1/m². None where the
-    depth bias is known: the equations hold far enough."""
-
-
-@dataclass(frozen=True, eq=False)
-class SurfaceDetails:
-    """What pictures show of a fit.
-
-    `points` (N, 3): patches in the silo frame, m; `residuals` (N,): their distance from the wall, m, NaN where a patch
-    is not wall.
-    """
-
-    points: NDArray[np.float64]
-    residuals: NDArray[np.float64]
-    wall: Any = None
-    """Where the frame's patches show the wall, for other frames of the camera to start from: a tuple that only the core
-    reads. None for clouds."""
-    _labelled: Callable[[], NDArray[np.uint8]] | None = None
-
-    @cached_property
-    def labels(self) -> NDArray[np.uint8] | None:
-        """Label of each pixel (H, W): 0 none, 1 cylinder, 2 cone, 3 feed, 4 other. Worked out when asked for."""
-        return None if self._labelled is None else self._labelled()
 
 
 def fit_depth(
@@ -193,14 +133,8 @@ def _priors(
 
 def refused(method: str, slug: str, config: dict[str, Any]) -> Estimate:
     """An estimate without an answer; the message says what the reason means and what to try."""
-    meaning, advice = reasons()[slug]
-    message = f"{meaning[0].upper()}{meaning[1:]}; {advice}."
+    message = sentence(estimate_refusals()[slug])
     return Estimate("refused", method, reason=slug, message=message, config=config)
-
-
-def reasons() -> dict[str, tuple[str, str]]:
-    """Every reason for a refusal: what it means, and what to try."""
-    return {slug: (meaning, advice) for slug, meaning, advice in _core.surface_refusals()}
 
 
 def _estimate(
@@ -300,7 +234,7 @@ def _gravity_check(pose: SiloPose, gravity: NDArray[np.float64]) -> dict[str, fl
 
 def _evidence(
     found: dict[str, Any], profile: SensorProfile, diameter: float | None, gravity: NDArray[np.float64] | None
-) -> SurfaceEvidence:
+) -> FrameFactor:
     slope, intercept = found["cone"] or (np.nan, np.nan)
     radius = np.nan if found["radius"] is None else found["radius"]
     prior = found["prior"]
@@ -313,7 +247,7 @@ def _evidence(
     if gravity is not None:
         tilt = SiloPose.from_axis(gravity, np.zeros(3))
         expected[:2] = tilt.r_x, tilt.r_y
-    return SurfaceEvidence(
+    return FrameFactor(
         parameters=np.array([*found["pose"], radius, slope, intercept, *found["bias"], *found["ovality"]])
         + found["step"],
         information=found["information"],

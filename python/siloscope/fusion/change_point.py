@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.fusion.solve import BIAS, FAR, RADIUS, SCALE, SIZE, Fused, Stack, Sums, deviation, fuse, majority, sums
+from siloscope.fusion.solve import BIAS, FAR, RADIUS, SCALE, Fused, Stack, deviation, fuse, majority, sums
+from siloscope.types.frame_factor import SIZE, SummedFactor
+from siloscope.types.move import Move
 
 SHORTEST = 3
 """A move needs this many agreeing frames on both sides; fewer are bad frames."""
@@ -35,20 +35,7 @@ STAYING = (4, 5, 7, 8, 9)
 """Parameters that it does not: radius, cone slope, depth bias."""
 
 
-@dataclass(frozen=True)
-class Move:
-    """A move of the camera before frame `index` of the sequence: by how much, and how sure that is."""
-
-    index: int
-    turn: float
-    """Angle between the axis directions before and after, rad (r_x and r_y together)."""
-    shift: float
-    """Change of (t_x, t_y), m."""
-    significance: float
-    """Squared distance between the poses in units of its covariance."""
-
-
-def find_moves(stack: Stack, earlier: Sums | None = None, first: int = 0) -> list[Move]:
+def find_moves(stack: Stack, earlier: SummedFactor | None = None, first: int = 0) -> list[Move]:
     """All moves in the sequence, in order; `earlier` frames stand before it."""
     known = 0 if earlier is None else earlier.frames
     if stack.count < SHORTEST or known + stack.count < 2 * SHORTEST:
@@ -68,7 +55,7 @@ def may_have_moved(fused: Fused) -> bool:
     return any(left_out[first : first + SHORTEST].all() for first in range(len(left_out) - SHORTEST + 1))
 
 
-def _best_split(stack: Stack, earlier: Sums | None) -> int | None:
+def _best_split(stack: Stack, earlier: SummedFactor | None) -> int | None:
     """Where cutting the sequence in two leaves the smallest robust misfit; coarse to fine."""
     least = SHORTEST if earlier is None or earlier.frames < SHORTEST else 0
     low, high = least, stack.count - SHORTEST
@@ -84,20 +71,20 @@ def _best_split(stack: Stack, earlier: Sums | None) -> int | None:
         low, high = max(least, best - step), min(stack.count - SHORTEST, best + step)
 
 
-def _misfits(stack: Stack, places: NDArray[np.int_], before: bool, base: Sums | None) -> NDArray[np.float64]:
+def _misfits(stack: Stack, places: NDArray[np.int_], before: bool, base: SummedFactor | None) -> NDArray[np.float64]:
     """Robust misfit of the frames before or after each place about their own answer."""
     first = np.zeros_like(places) if before else places
     last = places if before else np.full_like(places, stack.count)
     number = np.arange(stack.count)
     members = (number >= first[:, None]) & (number < last[:, None])
     starts = np.linspace(first, np.maximum(last - 1, first), FEW_STARTS, axis=1).round().astype(np.intp)
-    centres = majority(stack, members, np.minimum(starts, stack.count - 1), base or Sums.nothing())
+    centres = majority(stack, members, np.minimum(starts, stack.count - 1), base or SummedFactor.nothing())
     off = np.clip(deviation(stack.distances(centres), stack.dof), 0.0, FAR)
     misfits: NDArray[np.float64] = np.where(members, off**2, 0.0).sum(axis=1)
     return misfits
 
 
-def _judged(stack: Stack, earlier: Sums | None, split: int, first: int) -> Move | None:
+def _judged(stack: Stack, earlier: SummedFactor | None, split: int, first: int) -> Move | None:
     """The move at a place, if both sides agree within themselves and not with each other."""
     before, after = stack.take(slice(0, split)), stack.take(slice(split, None))
     sides = [fuse(before, earlier) if before.count else None, fuse(after)]
@@ -127,18 +114,18 @@ def _placed(stack: Stack, split: int, sides: list[Fused | None]) -> int:
     return split
 
 
-def _agreeing(side: Fused | None, earlier: Sums | None) -> int:
+def _agreeing(side: Fused | None, earlier: SummedFactor | None) -> int:
     known = 0 if earlier is None else earlier.frames
     return known + (0 if side is None else int((side.weights > 0.5).sum()))
 
 
-def _side(part: Stack, fused: Fused | None, base: Sums | None) -> Sums:
+def _side(part: Stack, fused: Fused | None, base: SummedFactor | None) -> SummedFactor:
     if fused is None:
-        return base or Sums.nothing()
+        return base or SummedFactor.nothing()
     return sums(part, fused.weights, fused.parameters, base)
 
 
-def _contrast(sides: list[Sums], excess: float) -> tuple[NDArray[np.float64], float]:
+def _contrast(sides: list[SummedFactor], excess: float) -> tuple[NDArray[np.float64], float]:
     """Step of the pose between two sides (4,), and its squared distance from none.
 
     Both sides share radius, cone slope, depth bias and the priors on them: only the pose, and the cone seen from it,

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
-from siloscope.fusion.solve import BIAS, SIZE, Matrix, Stack, Sums, Vector, fuse, solved_by_frame
+from siloscope.fusion.solve import BIAS, Stack, fuse, solved_by_frame
+from siloscope.types.frame_factor import SIZE, Matrix, SummedFactor, Vector
 
 DEPTH_BIAS = slice(BIAS, BIAS + 3)
 
@@ -43,7 +44,7 @@ def at_bias(stack: Stack, common: Vector) -> Stack:
     return _carried(stack, _with_bias(stack, common[DEPTH_BIAS]))
 
 
-def straightened(stack: Stack, earlier: Sums | None = None) -> Stack:
+def straightened(stack: Stack, earlier: SummedFactor | None = None) -> Stack:
     """The frames with equations about their common answer; as they are where the sensor's bias is known."""
     if not bias_is_free(stack):
         return stack
@@ -52,7 +53,7 @@ def straightened(stack: Stack, earlier: Sums | None = None) -> Stack:
     return _carried(stack, np.where(np.isfinite(common), common, _own(stack)))
 
 
-def _common(stack: Stack, earlier: Sums | None) -> Vector:
+def _common(stack: Stack, earlier: SummedFactor | None) -> Vector:
     """The answer about which the frames' equations give the same answer again."""
     found = fuse(stack, earlier)
     found = fuse(at_bias(stack, found.parameters), earlier)

@@ -1,6 +1,6 @@
 """Frames of one silo, fused by information: robust centre, weights, and a covariance that contains what they share.
 
-Notation: frame i has the answer θ_i, its information Λ_i and gradient g_i there (`SurfaceEvidence`), so that its
+Notation: frame i has the answer θ_i, its information Λ_i and gradient g_i there (`FrameFactor`), so that its
 negative log-likelihood is ``g_i·δ + δᵀ Λ_i δ / 2`` at θ_i + δ. Priors are common to all frames and enter once.
 The manual's page on calibration derives every formula.
 """
@@ -14,9 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.estimation.surface import PARAMETERS, SurfaceEvidence
+from siloscope.types.frame_factor import PARAMETERS, SIZE, FrameFactor, Matrix, SummedFactor, Vector
 
-SIZE = len(PARAMETERS)
 RADIUS, SCALE, QUADRATIC = (PARAMETERS.index(name) for name in ("radius", "scale", "quadratic"))
 BIAS = PARAMETERS.index("offset")
 """From here on a parameter is estimated only where a prior holds it."""
@@ -48,39 +47,11 @@ SAME_SIZE = 0.01
 UPPER = np.triu_indices(SIZE)
 """Rows and columns of a symmetric matrix' upper triangle."""
 
-Vector = NDArray[np.float64]
-Matrix = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Sums:
-    """Frames added up about `origin` (12,): what is kept of frames whose own evidence is not.
-
-    `information` is Σ w Λ, `pull` Σ w (Λ (θ - origin) - g), `noise` Σ w² N, `weight` Σ w; and `weight`
-    times `shared` is what the frames may share.
-    """
-
-    origin: Vector
-    information: Matrix
-    pull: Vector
-    noise: Matrix
-    shared: Matrix
-    weight: float
-    frames: int
-    prior_information: Vector
-    prior_mean: Vector
-
-    @classmethod
-    def nothing(cls) -> Sums:
-        """No frames."""
-        zero, none = np.zeros((SIZE, SIZE)), np.zeros(SIZE)
-        return cls(none, zero, none, zero, zero, 0.0, 0, none, none)
-
 
 class Stack:
     """Evidence of several frames as arrays, one frame a row."""
 
-    def __init__(self, frames: Sequence[SurfaceEvidence]) -> None:
+    def __init__(self, frames: Sequence[FrameFactor]) -> None:
         self.count = len(frames)
         self.answers = _stacked([f.parameters for f in frames], (SIZE,))
         self.seen = np.isfinite(self.answers)
@@ -221,9 +192,9 @@ class Fused:
         return float((self.weights < 0.5).mean())
 
 
-def fuse(stack: Stack, earlier: Sums | None = None) -> Fused:
+def fuse(stack: Stack, earlier: SummedFactor | None = None) -> Fused:
     """Robust fusion: the answer of the majority, then every frame weighed by how well it agrees."""
-    base = earlier or Sums.nothing()
+    base = earlier or SummedFactor.nothing()
     everyone = np.ones((1, stack.count), bool)
     found = _reweighted(stack, base, _completed(stack, base, majority(stack, everyone, _starts(stack), base)))
     if (found[1] < 0.5).any():  # half of a few frames may agree by chance where each leaves much open: do all agree?
@@ -232,7 +203,7 @@ def fuse(stack: Stack, earlier: Sums | None = None) -> Fused:
     return _with_covariance(stack, *found[1:], base)
 
 
-def _completed(stack: Stack, base: Sums, centre: Matrix) -> Matrix:
+def _completed(stack: Stack, base: SummedFactor, centre: Matrix) -> Matrix:
     """A majority's answer; where it lacks what others that agree with it have seen, the answer of most of those."""
     lacking = ~np.isfinite(centre[0]) & stack.seen.any(axis=0)
     near = agreement(deviation(stack.distances(centre)[0], stack.dof)) > 0.0
@@ -250,7 +221,7 @@ def _cost(stack: Stack, centre: Matrix) -> float:
     return float((off**2).sum())
 
 
-def _reweighted(stack: Stack, base: Sums, centre: Matrix) -> tuple[Matrix, Vector, float]:
+def _reweighted(stack: Stack, base: SummedFactor, centre: Matrix) -> tuple[Matrix, Vector, float]:
     """The answer near a first one, with each frame weighed by how well it agrees; the weights, and the excess."""
     weights, excess = np.ones(stack.count), 1.0
     for again in range(30):
@@ -265,7 +236,7 @@ def _reweighted(stack: Stack, base: Sums, centre: Matrix) -> tuple[Matrix, Vecto
     return centre, weights, excess
 
 
-def solve(stack: Stack, weights: Matrix, base: Sums) -> Matrix:
+def solve(stack: Stack, weights: Matrix, base: SummedFactor) -> Matrix:
     """Answers (K, 12) to K weightings (K, N): ``(Σ w Λ + Π)⁻¹ (Σ w (Λ θ - g) + Π μ)``; NaN for what nobody saw."""
     return _answers(*_systems(stack, weights, base))
 
@@ -277,7 +248,7 @@ def _answers(system: Matrix, pull: Matrix, origin: Vector, solved: NDArray[np.bo
     return answers
 
 
-def majority(stack: Stack, members: NDArray[np.bool_], starts: NDArray[np.intp], base: Sums) -> Matrix:
+def majority(stack: Stack, members: NDArray[np.bool_], starts: NDArray[np.intp], base: SummedFactor) -> Matrix:
     """Least trimmed squares for K groups of frames: the answers (K, 12) about which half of a group lie closest.
 
     `members` (K, N) are the groups, `starts` (S,) or (K, S) the frames from which the search starts.
@@ -303,13 +274,13 @@ def _closest(stack: Stack, centres: Matrix, within: NDArray[np.bool_], half: NDA
     return chosen.astype(float), np.where(chosen, relative, 0.0).sum(axis=1)
 
 
-def sums(stack: Stack, weights: Vector, origin: Vector, base: Sums | None = None) -> Sums:
+def sums(stack: Stack, weights: Vector, origin: Vector, base: SummedFactor | None = None) -> SummedFactor:
     """The frames added up, to be gone on with when their own evidence is no longer there."""
-    start = base or Sums.nothing()
+    start = base or SummedFactor.nothing()
     origin = np.nan_to_num(origin)
     information, pull = _added(stack, weights[None], origin)
     prior, mean = prior_of(stack, weights[None], start)
-    return Sums(
+    return SummedFactor(
         origin,
         information[0] + start.information,
         pull[0] + start.pull + start.information @ (start.origin - origin),
@@ -322,7 +293,7 @@ def sums(stack: Stack, weights: Vector, origin: Vector, base: Sums | None = None
     )
 
 
-def _in_common(stack: Stack, weights: Vector, base: Sums) -> Matrix:
+def _in_common(stack: Stack, weights: Vector, base: SummedFactor) -> Matrix:
     """Covariance (12, 12) of what the frames may share, added up, however much of it they do share.
 
     For parts ``b`` with covariances E, ``(Σ b)(Σ b)ᵀ ≤ Σ E/α`` for any shares α > 0 of 1 (Cauchy and Schwarz). Shares
@@ -348,7 +319,7 @@ def agreement(deviations: Vector) -> Vector:
     return np.clip(2.0 - (np.maximum(deviations, 0.0) / AGREE) ** 2, 0.0, 1.0)
 
 
-def prior_of(stack: Stack, weights: Matrix, base: Sums) -> tuple[Vector, Matrix]:
+def prior_of(stack: Stack, weights: Matrix, base: SummedFactor) -> tuple[Vector, Matrix]:
     """What was known before the frames, once for all of them: information (12,), and mean (K, 12) for K weightings.
 
     Frames may state different means where each has its own accelerometer reading.
@@ -389,7 +360,7 @@ def _product(weights: Matrix, rows: Matrix) -> Matrix:
 
 
 def _systems(
-    stack: Stack, weights: Matrix, base: Sums, share: float = 1.0
+    stack: Stack, weights: Matrix, base: SummedFactor, share: float = 1.0
 ) -> tuple[Matrix, Matrix, Vector, NDArray[np.bool_]]:
     """Normal equations about an origin, and which parameters they determine; the others stay at the origin.
 
@@ -409,12 +380,12 @@ def _systems(
     return system, np.where(solved, pull + prior * (mean - origin), 0.0), origin, solved
 
 
-def _origin(stack: Stack, base: Sums) -> Vector:
+def _origin(stack: Stack, base: SummedFactor) -> Vector:
     """A point near the answer, so that sums about it keep their digits."""
     return np.where(stack.seen.any(axis=0), stack.middle, base.origin)
 
 
-def _with_covariance(stack: Stack, weights: Vector, excess: float, base: Sums) -> Fused:
+def _with_covariance(stack: Stack, weights: Vector, excess: float, base: SummedFactor) -> Fused:
     """The answer by which the pose is known best, however much the frames count beside what was known before them.
 
     Their information is that of their noise alone. Where what they share is larger, they would override what was known
@@ -434,7 +405,7 @@ def _with_covariance(stack: Stack, weights: Vector, excess: float, base: Sums) -
 
 
 def _sandwich(
-    stack: Stack, weights: Vector, base: Sums, share: float, spread: Matrix
+    stack: Stack, weights: Vector, base: SummedFactor, share: float, spread: Matrix
 ) -> tuple[Vector, Matrix, NDArray[np.bool_]]:
     """The answer of a share of what the frames say; its covariance ``P (Π + share² spread) P``; what it determines."""
     equations = _systems(stack, weights[None], base, share)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.errors import InputError
+from siloscope.io.terms import Options as Options
 from siloscope.io.terms import UnknownUnit, finish
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
@@ -26,34 +27,6 @@ MAX_SIDE = 20_000
 
 MAX_PIXELS = 100_000_000
 """Largest image, in pixels; above it the file is taken for damaged or hostile."""
-
-
-@dataclass(frozen=True)
-class Options:
-    """What the user says about the input; it always wins over what the file says.
-
-    Attributes
-    ----------
-    cameras : tuple of Camera
-        Empty, or the user's camera; several where their file lists a resolution each (the frame's size chooses).
-    depth_unit : float or None
-        Metres per raw unit. It also scales floating-point depth and points, unless they are metres already.
-    camera_depth_unit : float or None
-        Metres per raw unit as the user's camera file has it; wins over the file's own, for raw units only.
-    stream : str or None
-        Which of several streams, by name or a part of it that fits only one.
-    ray_length : bool
-        The file's depth is the length of the ray, not z.
-    beside : bool
-        Whether to take the camera from a file beside the frame, where the format has no place for one.
-    """
-
-    cameras: tuple[Camera, ...] = ()
-    depth_unit: float | None = None
-    camera_depth_unit: float | None = None
-    stream: str | None = None
-    ray_length: bool = False
-    beside: bool = True
 
 
 class Item(NamedTuple):

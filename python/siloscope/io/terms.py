@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,6 @@ from numpy.typing import NDArray
 from siloscope.errors import InputError
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
-
-if TYPE_CHECKING:
-    from siloscope.io.source import Options
 
 FARTHEST_M = 100.0
 """Median depth above which floating-point "metres" are taken for some other unit."""
@@ -25,6 +22,34 @@ NEAREST_M = 0.05
 """Median depth, or extent of points, below which a given unit is not meant for values that are metres already."""
 
 _UNITLESS_CLOUDS = ("ply", "pcd", "xyz", "npy", "npz", "folder")
+
+
+@dataclass(frozen=True)
+class Options:
+    """What the user says about the input; it always wins over what the file says.
+
+    Attributes
+    ----------
+    cameras : tuple of Camera
+        Empty, or the user's camera; several where their file lists a resolution each (the frame's size chooses).
+    depth_unit : float or None
+        Metres per raw unit. It also scales floating-point depth and points, unless they are metres already.
+    camera_depth_unit : float or None
+        Metres per raw unit as the user's camera file has it; wins over the file's own, for raw units only.
+    stream : str or None
+        Which of several streams, by name or a part of it that fits only one.
+    ray_length : bool
+        The file's depth is the length of the ray, not z.
+    beside : bool
+        Whether to take the camera from a file beside the frame, where the format has no place for one.
+    """
+
+    cameras: tuple[Camera, ...] = ()
+    depth_unit: float | None = None
+    camera_depth_unit: float | None = None
+    stream: str | None = None
+    ray_length: bool = False
+    beside: bool = True
 
 
 class UnknownUnit(InputError):

@@ -5,9 +5,9 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
-from siloscope.content.result import Content
-from siloscope.content.surface_map import KINDS, SurfaceMap
 from siloscope.schema import documents
+from siloscope.types.content import Content
+from siloscope.types.surface_map import KINDS, SurfaceMap
 
 COLUMNS = ("x_m", "y_m", "height_m", "std_m", "kind")
 """Columns of the map's file; heights are over the reading's datum."""

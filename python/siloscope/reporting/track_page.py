@@ -11,8 +11,8 @@ import numpy as np
 
 from siloscope.reporting.report import Report, picture, table, text
 from siloscope.schema import documents
-from siloscope.tracking.story import ABSOLUTE, DAY, Event, Reading, Track, utc
 from siloscope.tracking.tables import write_csv, write_jsonl, write_parquet
+from siloscope.types.track import ABSOLUTE, DAY, Event, Reading, Track, utc
 from siloscope.wording import with_std
 
 FORECAST_POINTS = 60

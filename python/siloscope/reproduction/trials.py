@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.estimation.surface import SurfaceEvidence
 from siloscope.reproduction.packing import packed, unpacked
 from siloscope.reproduction.solvers import ALL, KNOWN
 from siloscope.sensors import SensorProfile
 from siloscope.simulation import Scene, SimulatedFrame, metrics
-from siloscope.types.estimate import Estimate, Ratios, SiloGeometry
+from siloscope.types.estimate import Estimate, Ratios
+from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
+from siloscope.types.vessel import SiloGeometry
 
 STRIDE = 37
 """Every so many points of the adjusted cloud are asked for their nearest reference point (Eq. 11); it shares no factor
@@ -96,7 +97,7 @@ class Answer:
     covariance: NDArray[np.float64] | None
     """(4, 4) of r_x, r_y, t_x, t_y."""
     silo: SiloGeometry
-    evidence: SurfaceEvidence | None
+    evidence: FrameFactor | None
     distance: float | None
     """PC average distance, m."""
 
@@ -111,7 +112,7 @@ class Answer:
             None if data["pose"] is None else SiloPose(*data["pose"]),
             None if covariance is None else np.array(covariance),
             SiloGeometry(**data["silo"]),
-            None if evidence is None else unpacked(SurfaceEvidence, evidence),
+            None if evidence is None else unpacked(FrameFactor, evidence),
             data["distance"],
         )
 

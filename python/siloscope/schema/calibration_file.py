@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from siloscope import sensors
 from siloscope.errors import InputError
-from siloscope.estimation.surface import PARAMETERS, SurfaceEvidence
-from siloscope.fusion.change_point import Move
-from siloscope.fusion.solve import SIZE, Sums
-from siloscope.types.calibration import QUALITY, SCHEMA, STATUSES, Calibration, Evidence, FrameRecord
-from siloscope.types.estimate import SiloGeometry
+from siloscope.reasons import CALIBRATION_REMARKS, FRAME_STATUSES
+from siloscope.types.calibration import SCHEMA, Calibration, Evidence, FrameRecord
+from siloscope.types.frame_factor import PARAMETERS, SIZE, FrameFactor, SummedFactor
+from siloscope.types.move import Move
 from siloscope.types.pose import SiloPose
+from siloscope.types.vessel import SiloGeometry
 
 LARGEST_FILE = 50_000_000
 """Bytes; 300 frames of evidence take about 2 MB."""
@@ -74,7 +74,7 @@ def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
     }
 
 
-def _frame_to_dict(number: int, frame: SurfaceEvidence) -> dict[str, Any]:
+def _frame_to_dict(number: int, frame: FrameFactor) -> dict[str, Any]:
     return {
         "index": number,
         **{name: _nullable(getattr(frame, name)) for name in _VECTORS},
@@ -85,7 +85,7 @@ def _frame_to_dict(number: int, frame: SurfaceEvidence) -> dict[str, Any]:
     }
 
 
-def _sums_to_dict(sums: Sums) -> dict[str, Any]:
+def _sums_to_dict(sums: SummedFactor) -> dict[str, Any]:
     return {
         **{name: getattr(sums, name).tolist() for name in _SUM_VECTORS},
         **{name: _triangle(getattr(sums, name)) for name in _SUM_MATRICES},
@@ -209,7 +209,7 @@ def _evidence(table: dict[str, Any]) -> Evidence:
     )
 
 
-def _frame_evidence(table: dict[str, Any], where: str) -> tuple[int, SurfaceEvidence]:
+def _frame_evidence(table: dict[str, Any], where: str) -> tuple[int, FrameFactor]:
     free = _entry(table, "free", list, f"{where}.free")
     if len(free) != SIZE or not all(isinstance(f, bool) for f in free):
         raise _Wrong(f"'{where}.free' must be {SIZE} times true or false")
@@ -217,7 +217,7 @@ def _frame_evidence(table: dict[str, Any], where: str) -> tuple[int, SurfaceEvid
     matrices = {name: _symmetric(table, name, f"{where}.{name}") for name in _MATRICES}
     scale_std = _number(table, "scale_std", least=0.0, where=where)
     rays = _rays(table, f"{where}.rays")
-    frame = SurfaceEvidence(**vectors, **matrices, free=np.array(free), scale_std=scale_std, rays=rays)
+    frame = FrameFactor(**vectors, **matrices, free=np.array(free), scale_std=scale_std, rays=rays)
     for name in ("parameters", "base"):
         if not np.isfinite(vectors[name][frame.free]).all():
             raise _Wrong(f"'{where}.{name}' lacks a value that was estimated")
@@ -234,9 +234,9 @@ def _rays(table: dict[str, Any], where: str) -> NDArray[np.float64]:
     return rays
 
 
-def _sums(table: dict[str, Any]) -> Sums:
+def _sums(table: dict[str, Any]) -> SummedFactor:
     where = "evidence.earlier"
-    return Sums(
+    return SummedFactor(
         **{name: _vector(table, name, f"{where}.{name}") for name in _SUM_VECTORS},
         **{name: _symmetric(table, name, f"{where}.{name}") for name in _SUM_MATRICES},
         weight=_number(table, "weight", least=0.0, where=where),
@@ -249,7 +249,7 @@ def _record(table: dict[str, Any], where: str) -> FrameRecord:
     return FrameRecord(
         index=_index(table, where),
         name=_entry(table, "name", str, f"{where}.name"),
-        status=_one_of(table, "status", tuple(STATUSES), where),
+        status=_one_of(table, "status", tuple(FRAME_STATUSES), where),
         weight=_number(table, "weight", least=0.0, where=where),
         deviation=None if deviation is None else _finite(deviation, f"{where}.deviation"),
         pose=None if table.get("r_x") is None else _pose(table, where),
@@ -283,7 +283,7 @@ def _pose(table: dict[str, Any], where: str) -> SiloPose:
 
 
 def _code(code: Any) -> str:
-    if code not in QUALITY:
+    if code not in CALIBRATION_REMARKS:
         raise _Wrong(f"'quality' holds the unknown code {code!r}")
     return str(code)
 

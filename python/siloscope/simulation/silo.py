@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from siloscope import _core
 from siloscope.simulation.checked import checked
 from siloscope.simulation.feed import Feed
-from siloscope.types.estimate import SiloGeometry
+from siloscope.types.vessel import SiloGeometry
 
 
 @dataclass(frozen=True)

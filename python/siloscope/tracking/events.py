@@ -8,7 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.tracking.story import Event, Moment
+from siloscope.tracking.story import Moment
+from siloscope.types.track import Event
 
 TURN_SIGMAS = 5.0
 """A rise or fall must exceed so many standard deviations of a difference to be an event."""

@@ -9,7 +9,7 @@ from typing import Any
 
 from siloscope.errors import UsageError
 from siloscope.schema import documents
-from siloscope.tracking.story import Track
+from siloscope.types.track import Track
 
 COLUMNS = (
     *("index", "name", "time", "time_utc", "status", "reason", "volume_m3", "volume_std_m3", "fill_fraction"),

@@ -7,7 +7,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.tracking.story import DAY, Event, Moment, Use
+from siloscope.tracking.story import Moment
+from siloscope.types.track import DAY, Event, Use
 
 FEWEST_DAYS = 1.0
 """Shorter histories tell no daily use."""

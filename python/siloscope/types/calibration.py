@@ -11,34 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.estimation.surface import PARAMETERS, SurfaceEvidence
-from siloscope.fusion.change_point import Move
-from siloscope.fusion.solve import Sums
-from siloscope.types.estimate import SiloGeometry
+from siloscope.reasons import FRAME_STATUSES
+from siloscope.types.frame_factor import PARAMETERS, FrameFactor, SummedFactor
+from siloscope.types.move import Move
 from siloscope.types.pose import SiloPose
+from siloscope.types.vessel import SiloGeometry
 
 SCHEMA = "siloscope.calibration/1"
-
-STATUSES = {
-    "used": "fused, with the weight that stands beside it",
-    "rejected": "it has an answer, but one that disagrees with the other frames'",
-    "before-move": "taken before the camera moved",
-    "not-averaged": "older than the last 10 of the paper's rule",
-    "refused": "read well, but it does not show enough wall; its reason says why",
-    "unreadable": "it can't be read or used",
-}
-"""What becomes of a frame: stable name and what it means."""
-
-QUALITY = {
-    "camera-moved": "the camera moved during the sequence; only the frames since are fused",
-    "few-frames": "fewer than 3 frames agree; a wrong one could not be told from a right one",
-    "many-frames-disagree": "more than a quarter of the frames disagree with the rest",
-    "frames-scatter": "the frames scatter over twice as far as they state; the covariance is widened by that",
-    "scale-unknown": "the depth scale is not known; a measured diameter would make every length surer",
-    "cone-not-seen": "no frame shows the cone; the apex and the cylinder's bottom are unknown",
-    "cylinder-not-seen": "no frame shows the cylinder; radius and cylinder's bottom are unknown",
-}
-"""Remarks on a calibration: stable code and what it means."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +28,7 @@ class FrameRecord:
     """Number in the sequence, from 0, counted on when a calibration is continued."""
     name: str
     status: str
-    """One of `STATUSES`."""
+    """One of `FRAME_STATUSES`."""
     weight: float = 0.0
     """With which it was fused, 0 to 1."""
     deviation: float | None = None
@@ -78,9 +57,9 @@ class FrameRecord:
 class Evidence:
     """What a calibration rests on, and is continued from."""
 
-    frames: tuple[tuple[int, SurfaceEvidence], ...] = ()
+    frames: tuple[tuple[int, FrameFactor], ...] = ()
     """Frame number and what it says, in the order of the sequence."""
-    earlier: Sums | None = None
+    earlier: SummedFactor | None = None
     """Frames before those, added up."""
 
 
@@ -99,7 +78,7 @@ class Calibration:
     silo: SiloGeometry = field(default_factory=SiloGeometry)
     silo_std: SiloGeometry = field(default_factory=SiloGeometry)
     parameters: NDArray[np.float64] | None = None
-    """(12,) in the order of `estimation.surface.PARAMETERS`; NaN where not seen. None for the paper's rule."""
+    """(12,) in the order of `PARAMETERS`; NaN where not seen. None for the paper's rule."""
     parameter_covariance: NDArray[np.float64] | None = None
     """(12, 12) covariance of `parameters`, with zero rows for what is fixed or not seen."""
     excess: float = 1.0
@@ -110,7 +89,7 @@ class Calibration:
     """Moves of the camera in the sequence."""
     frames: tuple[FrameRecord, ...] = ()
     quality: tuple[str, ...] = ()
-    """Codes of `QUALITY`."""
+    """Codes of `CALIBRATION_REMARKS`."""
     reason: str | None = None
     message: str | None = None
     config: dict[str, Any] = field(default_factory=dict)
@@ -157,7 +136,7 @@ class Calibration:
     def counts(self) -> dict[str, int]:
         """Number of frames by status."""
         found = Counter(record.status for record in self.frames)
-        return {status: found[status] for status in STATUSES}
+        return {status: found[status] for status in FRAME_STATUSES}
 
     def to_dict(self) -> dict[str, Any]:
         """The document of ``siloscope calibrate`` (schema ``siloscope.calibration/1``)."""

@@ -2,35 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
-
-if TYPE_CHECKING:
-    from siloscope.estimation.surface import SurfaceDetails, SurfaceEvidence
-
-
-@dataclass(frozen=True)
-class SiloGeometry:
-    """A silo as a cylinder on a cone, in the silo frame (z along gravity, 0 at the camera's height), in metres.
-
-    What was not seen is None.
-    """
-
-    radius: float | None = None
-    """Radius of the cylinder."""
-    cylinder_bottom: float | None = None
-    """z where the cylinder meets the cone."""
-    apex: float | None = None
-    """z of the cone's vertex."""
-
-    def to_dict(self) -> dict[str, float | None]:
-        """The contract's ``silo`` object."""
-        return {"radius": self.radius, "cylinder_bottom": self.cylinder_bottom, "apex": self.apex}
+from siloscope.types.vessel import SiloGeometry
 
 
 @dataclass(frozen=True)
@@ -44,6 +26,27 @@ class Ratios:
     def to_dict(self) -> dict[str, float]:
         """Plain data."""
         return {"cylinder": self.cylinder, "cone": self.cone, "feed": self.feed}
+
+
+@dataclass(frozen=True, eq=False)
+class SurfaceDetails:
+    """What pictures show of a fit.
+
+    `points` (N, 3): patches in the silo frame, m; `residuals` (N,): their distance from the wall, m, NaN where a patch
+    is not wall.
+    """
+
+    points: NDArray[np.float64]
+    residuals: NDArray[np.float64]
+    wall: Any = None
+    """Where the frame's patches show the wall, for other frames of the camera to start from: a tuple that only the core
+    reads. None for clouds."""
+    _labelled: Callable[[], NDArray[np.uint8]] | None = None
+
+    @cached_property
+    def labels(self) -> NDArray[np.uint8] | None:
+        """Label of each pixel (H, W): 0 none, 1 cylinder, 2 cone, 3 feed, 4 other. Worked out when asked for."""
+        return None if self._labelled is None else self._labelled()
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +74,7 @@ class Estimate:
     timing_ms: dict[str, float] = field(default_factory=dict)
     extra: dict[str, Any] = field(default_factory=dict)
     """Further keys of the JSON document, such as the gravity check."""
-    evidence: SurfaceEvidence | None = None
+    evidence: FrameFactor | None = None
     """What the frame says about every parameter, for fusing frames (method ``surface``)."""
     details: SurfaceDetails | None = None
     """Patches, residuals and labels, for pictures (method ``surface``)."""

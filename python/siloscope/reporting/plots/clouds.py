@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from siloscope.reporting.plots.depth import paint_depth
 from siloscope.reporting.plots.style import BLUE, GREY, INK, RED, figure, heading, legend, tidy
 from siloscope.reporting.plots.view import Points, View, bare, circle, outline, thin
-from siloscope.types.estimate import SiloGeometry
 from siloscope.types.pose import SiloPose
+from siloscope.types.vessel import SiloGeometry
 
 
 def clouds(points: Points, corrected: Points, pose: SiloPose, silo: SiloGeometry) -> Figure:

@@ -11,11 +11,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 from matplotlib.patheffects import AbstractPathEffect, withStroke
 
-from siloscope.content.result import Content
-from siloscope.content.surface_map import SurfaceMap
 from siloscope.reporting.plots.outline import GRAIN, Numbers, Outline, datum, headline, outline_of
 from siloscope.reporting.plots.solid import surface_3d
 from siloscope.reporting.plots.style import BLUE, INK, MUTED, RULE, figure, heading, legend, tidy
+from siloscope.types.content import Content
+from siloscope.types.surface_map import SurfaceMap
 
 RASTER = 301
 """Places along a side at which a map is drawn."""

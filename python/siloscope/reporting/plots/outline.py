@@ -8,8 +8,8 @@ import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 from numpy.typing import NDArray
 
-from siloscope.content.result import Content
-from siloscope.content.surface_map import SurfaceMap
+from siloscope.types.content import Content
+from siloscope.types.surface_map import SurfaceMap
 from siloscope.wording import with_std
 
 Numbers = NDArray[np.float64]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from siloscope.reporting.plots.style import AMBER, BLUE, INK, MUTED, figure, heading, legend, tidy
 from siloscope.reporting.plots.view import Points
-from siloscope.types.estimate import SiloGeometry
+from siloscope.types.vessel import SiloGeometry
 
 MOST = 40_000
 

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.colors import Normalize, to_rgb
 from matplotlib.figure import Figure
 
-from siloscope.content.result import Content
-from siloscope.content.surface_map import SurfaceMap
 from siloscope.reporting.plots.outline import GRAIN, Numbers, Outline, datum, headline, outline_of
 from siloscope.reporting.plots.style import MUTED, figure, heading
+from siloscope.types.content import Content
+from siloscope.types.surface_map import SurfaceMap
 
 FEED = "#d9a441"
 WALL = "#dde2e8"

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from siloscope.reporting.plots.style import INK, MUTED
-from siloscope.types.estimate import SiloGeometry
+from siloscope.types.vessel import SiloGeometry
 
 Points = NDArray[np.float64]
 MOST_POINTS = 12_000

@@ -6,11 +6,39 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from siloscope.content.capacity import Lengths, to_plain
-from siloscope.content.quality import Remark
-from siloscope.content.surface_map import Shape, SurfaceMap
+from siloscope.reasons import CONTENT_REMARKS
+from siloscope.types.surface_map import Shape, SurfaceMap
+from siloscope.types.vessel import Lengths, to_plain
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A code of `siloscope.reasons.CONTENT_REMARKS` with what was seen."""
+
+    code: str
+    seen: str
+    """The figures that led to it, in words."""
+    refuses: bool = False
+    """Whether it leaves the reading without an answer."""
+
+    @property
+    def message(self) -> str:
+        """What it means."""
+        return CONTENT_REMARKS[self.code][0]
+
+    @property
+    def advice(self) -> str:
+        """What to do."""
+        return CONTENT_REMARKS[self.code][1]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {"code": self.code, "message": self.message, "advice": self.advice, "seen": self.seen,
+                "refuses": self.refuses}  # fmt: skip
+
 
 SCHEMA = "siloscope.content/1"
+
 
 DATUMS = ("cone-vertex", "lowest-seen")
 """From where heights are measured upwards."""
@@ -65,7 +93,7 @@ HIDDEN_ALIKE = 0.2
 class Content:
     """The content of a silo at one moment. Cubic metres, metres, kilograms, radians.
 
-    A refused reading (`status` "refused") has no numbers; `reason` is one of `siloscope.content.quality.QUALITY` and
+    A refused reading (`status` "refused") has no numbers; `reason` is one of `siloscope.reasons.CONTENT_REMARKS` and
     `message` says what it means and what to do. A number that needs something unknown is None, and `missing` names it.
     """
 

@@ -1,0 +1,108 @@
+"""Why answers are refused and what is remarked on them: every code with what it means and what to do."""
+
+from __future__ import annotations
+
+from siloscope import _core
+
+FRAME_STATUSES = {
+    "used": "fused, with the weight that stands beside it",
+    "rejected": "it has an answer, but one that disagrees with the other frames'",
+    "before-move": "taken before the camera moved",
+    "not-averaged": "older than the last 10 of the paper's rule",
+    "refused": "read well, but it does not show enough wall; its reason says why",
+    "unreadable": "it can't be read or used",
+}
+"""What becomes of a frame: stable name and what it means."""
+
+
+CALIBRATION_REMARKS = {
+    "camera-moved": "the camera moved during the sequence; only the frames since are fused",
+    "few-frames": "fewer than 3 frames agree; a wrong one could not be told from a right one",
+    "many-frames-disagree": "more than a quarter of the frames disagree with the rest",
+    "frames-scatter": "the frames scatter over twice as far as they state; the covariance is widened by that",
+    "scale-unknown": "the depth scale is not known; a measured diameter would make every length surer",
+    "cone-not-seen": "no frame shows the cone; the apex and the cylinder's bottom are unknown",
+    "cylinder-not-seen": "no frame shows the cylinder; radius and cylinder's bottom are unknown",
+}
+"""Remarks on a calibration: stable code and what it means."""
+
+
+CALIBRATION_REFUSALS = {
+    "no-frame-answers": (
+        "none of the frames shows enough wall",
+        "take frames at a lower level, or turn the camera so that more of the wall is in view",
+    ),
+    "frames-disagree": (
+        "the frames' answers scatter too far to be of one camera in one silo",
+        "check that all frames are of one camera in one silo, and what each of them says",
+    ),
+    "poorly-determined": (
+        "the frames agree, but together they show too little wall to fix the axis",
+        "go on with frames at a lower level, or turn the camera so that more of the wall is in view",
+    ),
+}
+"""Why there is no calibration: what it means, and what to try."""
+
+
+CONTENT_REMARKS: dict[str, tuple[str, str]] = {
+    "too-little-seen": (
+        "too little of the content's surface is seen to tell how much there is",
+        "clean the lens, free the view, or turn the camera so that it looks at the middle of the silo",
+    ),
+    "partly-seen": (
+        "less than a third of the surface is seen; the rest is continued from its slope",
+        "mind the larger deviation; a camera farther from the wall or with a wider view sees more",
+    ),
+    "sensor-buried": (
+        "nearly everything measured is far nearer than the sensor can measure",
+        "look whether the sensor is buried in feed, caked, or covered, and measure again when it is free",
+    ),
+    "dust-or-fog": (
+        "many single returns float between sensor and surface, as dust or fog make them",
+        "measure again when filling is over and the dust has settled",
+    ),
+    "lens-film": (
+        "large parts of the picture that should show the silo within the sensor's range show nothing",
+        "clean the window; in a cold silo warm it against condensation",
+    ),
+    "obstruction": (
+        "something hangs or stands between sensor and surface",
+        "look what it is; the surface behind it is continued from around it",
+    ),
+    "stuck-feed": (
+        "feed hangs on the wall above the surface",
+        "its volume is not counted; knock the silo free, and look for a bridge",
+    ),
+    "rathole": (
+        "the surface has a steep hole",
+        "the flow comes through a pipe in the feed; it may collapse at once, keep out and have it broken up",
+    ),
+    "filling-in-progress": (
+        "the surface moved since the frame before",
+        "measure again when filling or emptying is over; this reading belongs to its own moment",
+    ),
+    "camera-moved": (
+        "the wall no longer lies where the calibration has it",
+        "calibrate anew with frames taken since the camera was moved",
+    ),
+    "below-the-floor": (
+        "much of what is seen lies below the silo's floor",
+        "check that calibration and frame are of one silo and one camera",
+    ),
+}
+"""Code: what it means, what to do."""
+
+
+CONTENT_REFUSALS = ("too-little-seen", "sensor-buried", "camera-moved", "below-the-floor")
+"""Codes that may leave a reading without an answer; the others come beside one."""
+
+
+def estimate_refusals() -> dict[str, tuple[str, str]]:
+    """Every reason for a refusal: what it means, and what to try."""
+    return {slug: (meaning, advice) for slug, meaning, advice in _core.surface_refusals()}
+
+
+def sentence(reason: tuple[str, str], detail: str = "") -> str:
+    """What a reason means, with a detail, and what to try."""
+    meaning, advice = reason
+    return f"{meaning[0].upper()}{meaning[1:]}{detail}; {advice}."
