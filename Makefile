@@ -52,6 +52,7 @@ lint: build
 
 types: build
 	$(BIN)/mypy
+	$(BIN)/mypy --config-file tests/mypy.ini
 	$(BIN)/python -m mypy.stubtest siloscope._core --allowlist tests/stubtest-allowlist.txt
 
 golden: build ## compares about 400 answers with the ones kept in tests/golden, to the last bit

@@ -6,6 +6,7 @@ python -m benchmarks.accuracy --write
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from benchmarks import trials
@@ -60,7 +61,7 @@ def main() -> None:
     lines = []
     for row in ROWS if options.row < 0 else (ROWS[options.row],):
         scenes = row.scenes(seeds)
-        found = list(trials.each([s for _, s in scenes], lambda s, r=row: measured(r, s), options.jobs, row.name))
+        found = list(trials.each([s for _, s in scenes], partial(measured, row), options.jobs, row.name))
         for (name, _), (gap, reason) in zip(scenes, found, strict=True):
             if options.list or reason or gap > row.worst:
                 print(f"  {name}: {reason or f'{gap:.3f} mm'}")

@@ -15,6 +15,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -89,7 +90,7 @@ def read_zarr(path: Path) -> Iterator[Depth]:
 
     depth = zarr.open_array(path, mode="r")
     for number in range(depth.shape[0]):
-        yield depth[number]
+        yield np.asarray(depth[number])
 
 
 def add_blosc2(path: Path, frames: Iterable[Depth], contiguous: bool) -> Iterator[int]:
@@ -152,7 +153,7 @@ def survivors(store: Store, folder: Path, kills: int) -> str:
     for kill in range(kills):
         path = folder / f"killed{kill}"
         ours, theirs = os.pipe()
-        writer = in_child(lambda path=path, theirs=theirs: write_endlessly(store, path, few, theirs))
+        writer = in_child(partial(write_endlessly, store, path, few, theirs))
         os.close(theirs)
         done = len(os.read(ours, 3))
         time.sleep(draw.uniform(0, 0.1))
@@ -161,7 +162,7 @@ def survivors(store: Store, folder: Path, kills: int) -> str:
         while more := os.read(ours, 1000):
             done += len(more)
         os.close(ours)
-        reader = in_child(lambda path=path, done=done: check_readable(store, path, few, done))
+        reader = in_child(partial(check_readable, store, path, few, done))
         good += os.waitstatus_to_exitcode(os.waitpid(reader, 0)[1]) == 0
     return f"{good} of {kills}"
 
@@ -171,7 +172,7 @@ def after_full_disk(store: Store, folder: Path) -> str:
     path, few = folder / "full", list(np.random.default_rng(0).integers(0, 4000, (10, 480, 640), dtype=np.uint16))
     os.waitpid(in_child(lambda: append_to_full_disk(store, path, few)), 0)
     for count in range(len(few), 0, -1):
-        reader = in_child(lambda count=count: check_readable(store, path, few, count))
+        reader = in_child(partial(check_readable, store, path, few, count))
         if os.waitstatus_to_exitcode(os.waitpid(reader, 0)[1]) == 0:
             return f"{count} of {len(few)}"
     return f"0 of {len(few)}"

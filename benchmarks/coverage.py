@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from benchmarks import trials
@@ -123,7 +124,7 @@ def main() -> None:
     for row in ROWS if options.row < 0 else (ROWS[options.row],):
         count = options.frames if row.name.startswith("one") else options.sequences
         seeds = range(options.first, options.first + count)
-        answers = list(trials.each(seeds, lambda seed, r=row: r.answer(r.knowledge, seed), options.jobs, row.name))
+        answers = list(trials.each(seeds, partial(row.answer, row.knowledge), options.jobs, row.name))
         found = np.array([deviations(answer, scene) for answer, scene in answers if answer.ok]).reshape(-1, 7)
         for seed, (answer, scene) in zip(seeds, answers, strict=True):
             worst = np.nanmax(np.abs(deviations(answer, scene))) if answer.ok else 0.0

@@ -39,7 +39,7 @@ def main() -> None:
     ]
     found = list(trials.each(scenes, measured, options.jobs, "levels"))
     rows = [found[k : k + len(LEVELS)] for k in range(0, len(found), len(LEVELS))]
-    lines = []
+    lines: list[tuple[object, ...]] = []
     for (name, _), row in zip(named + unseen, rows, strict=True):
         if options.list:
             print(f"  {name}: " + ", ".join(f"{wall:.2f} {reason or f'{gap:.2f}'}" for gap, wall, reason in row))

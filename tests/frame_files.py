@@ -154,7 +154,8 @@ def labelled_table() -> NDArray[np.void]:
 
 def lzf(data: bytes) -> bytes:
     """Compresses as LZF does: greedy matches of the last three bytes seen before, literal runs between."""
-    out, run, last, i = bytearray(), bytearray(), {}, 0
+    out, run, i = bytearray(), bytearray(), 0
+    last: dict[bytes, int] = {}
     while i < len(data):
         key = data[i : i + 3]
         start = last.get(key, -1) if len(key) == 3 else -1

@@ -156,7 +156,7 @@ def broken_rule(path: Path) -> str | None:
     tracemalloc.start()
     try:
         with _time_limit(), warnings.catch_warnings(action="error"):
-            _read(path)
+            read(path)
     except InputError as error:
         if str(path) not in str(error):
             return f"an error that does not name the file: {error}"
@@ -170,7 +170,7 @@ def broken_rule(path: Path) -> str | None:
     return f"{peak >> 20} MiB of memory" if peak > largest else None
 
 
-def _read(path: Path) -> None:
+def read(path: Path) -> None:
     if "camera" in path.name:
         camera_files.read(path)
         return

@@ -7,12 +7,14 @@ the docstring; the defaults are repeated here on purpose, so that a changed defa
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.integer[Any]]
 
 
 def back_project(depth: Array, fx: float, fy: float, cx: float, cy: float) -> Array:
@@ -44,7 +46,7 @@ def nearest_neighbours(points: Array, k: int = 30) -> NDArray[np.intp]:
     return np.array(rows, dtype=np.intp).reshape(len(points), -1)
 
 
-def normals(points: Array, neighbours: NDArray[np.intp]) -> Array:
+def normals(points: Array, neighbours: Indices) -> Array:
     """Hoppe's normals, the smallest eigenvector of M = 1/k Σ (p_i − p)(p_i − p)ᵀ, turned towards the camera."""
     result = np.empty_like(points)
     for i, p in enumerate(points):
@@ -72,7 +74,7 @@ class ShapeTensors:
     E2: Array
 
 
-def shape_tensors(points: Array, neighbours: NDArray[np.intp], normal: Array) -> ShapeTensors:
+def shape_tensors(points: Array, neighbours: Indices, normal: Array) -> ShapeTensors:
     """Adjacent-normal cubic approximation (Goldfeather and Interrante 2004).
 
     In local coordinates with the normal as z, the surface is z = a/2 x² + b xy + c/2 y² + d x³ + e x²y + f xy² + g y³.
@@ -106,7 +108,7 @@ def shape_tensors(points: Array, neighbours: NDArray[np.intp], normal: Array) ->
 
 
 def select_candidates(
-    points: Array, neighbours: NDArray[np.intp], tensors: ShapeTensors, share: float = 0.7, view: str = "inside"
+    points: Array, neighbours: Indices, tensors: Any, share: float = 0.7, view: str = "inside"
 ) -> tuple[NDArray[np.intp], Array]:
     """The `share` with the smallest |k2| of the points that are clearly curved and surrounded: index and E1.
 

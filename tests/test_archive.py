@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -48,7 +49,7 @@ def alike(one: Frame, other: Frame) -> bool:
     same = np.array_equal(one.depth, other.depth, equal_nan=one.depth.dtype.kind == "f")
     same = same and one.depth.dtype == other.depth.dtype and one.camera == other.camera
     same = same and (one.depth_unit, one.timestamp) == (other.depth_unit, other.timestamp)
-    return same and np.array_equal(one.gravity, other.gravity)  # type: ignore[arg-type]
+    return same and np.array_equal(one.gravity, other.gravity)
 
 
 def test_what_goes_in_comes_out(tmp_path: Path) -> None:
@@ -95,12 +96,11 @@ def test_writing_goes_on_across_the_chunks_of_the_small_arrays(tmp_path: Path) -
 
 
 def test_an_interruption_at_any_write_leaves_the_frames_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    whole, calls = archive._replace, []
-    monkeypatch.setattr(archive, "_replace", lambda path, data: (calls.append(path), whole(path, data)))
-    archive.write(tmp_path / "counted", FRAMES[:3])
-    for stop in range(len(calls)):
+    calls = _write_until(tmp_path / "counted", None, monkeypatch)
+    assert calls > 18
+    for stop in range(calls):
         path = tmp_path / f"stopped{stop}"
-        _write_until(path, stop, whole, monkeypatch)
+        assert _write_until(path, stop, monkeypatch) == stop
         try:
             frames = read(path)
         except InputError:
@@ -108,24 +108,28 @@ def test_an_interruption_at_any_write_leaves_the_frames_before(tmp_path: Path, m
         finished = max(0, (stop - 4) // 6)
         assert len(frames) >= finished
         assert all(alike(*pair) for pair in zip(FRAMES, frames, strict=False))
-        monkeypatch.setattr(archive, "_replace", whole)
         if finished:
             archive.write(path, FRAMES[len(frames) : 3])
             assert all(alike(*pair) for pair in zip(FRAMES[:3], read(path), strict=True))
 
 
-def _write_until(path: Path, stop: int, whole: Any, monkeypatch: pytest.MonkeyPatch) -> None:
-    left = iter(range(stop))
+def _write_until(path: Path, stop: int | None, monkeypatch: pytest.MonkeyPatch) -> int:
+    """Writes three frames; the file after `stop` others is cut in half and never gets its name. How many got theirs."""
+    whole, named = Path.replace, 0
 
-    def interrupted(path: Path, data: bytes) -> None:
-        if next(left, None) is None:
-            path.with_name(f".{path.name}.new").write_bytes(data[: len(data) // 2])
+    def replace(beside: Path, target: Path) -> Path:
+        nonlocal named
+        if named == stop:
+            beside.write_bytes(beside.read_bytes()[: beside.stat().st_size // 2])
             raise KeyboardInterrupt
-        whole(path, data)
+        named += 1
+        return whole(beside, target)
 
-    monkeypatch.setattr(archive, "_replace", interrupted)
-    with pytest.raises(KeyboardInterrupt):
+    monkeypatch.setattr(Path, "replace", replace)
+    with contextlib.nullcontext() if stop is None else pytest.raises(KeyboardInterrupt):
         archive.write(path, FRAMES[:3])
+    monkeypatch.setattr(Path, "replace", whole)
+    return named
 
 
 _ENDLESS = """

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -160,10 +160,11 @@ def test_a_known_sensor_needs_no_second_look() -> None:
 def test_the_view_from_elsewhere_takes_any_layout_and_refuses_arrays_that_do_not_belong_together() -> None:
     stack = Stack([e.evidence for e in sequence(sensor=None) if e.evidence])
     near = 1e-6 * stack.free
-    given = (stack.base, stack.rays, stack.free, stack.base + near)
+    given: tuple[Any, ...] = (stack.base, stack.rays, stack.free, stack.base + near)
     steps, turns = _core.surface_seen_from(*given)
     np.testing.assert_allclose(steps, near, rtol=1e-2, atol=1e-9)
-    for layout in (np.asfortranarray, lambda a: np.repeat(a, 2, axis=0)[::2]):
+    layouts: list[Callable[[Any], Any]] = [np.asfortranarray, lambda a: np.repeat(a, 2, axis=0)[::2]]
+    for layout in layouts:
         again = _core.surface_seen_from(*(layout(array) for array in given))
         np.testing.assert_array_equal(again[0], steps)
         np.testing.assert_array_equal(again[1], turns)
@@ -354,7 +355,7 @@ def test_what_frames_share_is_bounded_whatever_they_share() -> None:
 def test_frames_that_share_most_of_their_error_are_surer_together(sensor: str | None) -> None:
     (recorded,) = (one for one in real() if one.name == "SiloR1 as printed")
     scenes = [trial.scene for trial in recorded.trials(10)]
-    frames = [found for scene in scenes if (found := located(scene, sensor)).ok]
+    frames = [seen for scene in scenes if (seen := located(scene, sensor)).ok]
     found = calibrate(frames)  # refused where what they say overrides how oval a silo may be: 57 and 20 mm
     alone = np.median([np.sqrt(np.diag(frame.covariance)) for frame in frames], axis=0)
     assert np.all(stds(found) < alone)
@@ -494,7 +495,7 @@ def _changed(keys: Sequence[Any], value: Any) -> str:
     return json.dumps(document)
 
 
-DAMAGES = {
+DAMAGES: dict[str, tuple[Any, ...]] = {
     "not JSON": ("{", "damaged"),
     "a list": ("[]", "no schema"),
     "deep": ("[" * 100_000, "damaged"),

@@ -186,7 +186,7 @@ def test_refusal_is_exit_4_with_reason_and_no_numbers(place: Path, tmp_path: Pat
     assert document["message"] in capsys.readouterr().out
 
 
-def camera_json(**changes: Any) -> Callable[[Path], None]:
+def camera_json(**changes: Any) -> Callable[[Path], object]:
     fields = {"width": 640, "height": 480, "fx": 570.3, "fy": 570.3, "cx": 319.5, "cy": 239.5} | changes
     return lambda path: path.write_text(json.dumps(fields))
 

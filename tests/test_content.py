@@ -66,7 +66,7 @@ class TestLaws:
             calibration,
             pose=pose,
             parameters=calibration.parameters * lengths,
-            silo=siloscope.SiloGeometry(*(s * float(v) for v in (g.radius, g.cylinder_bottom, g.apex))),  # type: ignore[arg-type]
+            silo=siloscope.SiloGeometry(*(s * float(v) for v in (g.radius, g.cylinder_bottom, g.apex))),
         )
         one = siloscope.measure(frame.frame(), calibration).volume
         other = siloscope.measure(s * frame.depth, grown, frame.camera).volume
@@ -492,7 +492,7 @@ class TestDisasters:
             {"sensor": "orbbec-astra-s"},
         ):
             with pytest.raises(UsageError):
-                siloscope.measure(frame, calibration, **bad)  # type: ignore[arg-type]
+                siloscope.measure(frame, calibration, **bad)
         with pytest.raises(InputError, match="no answer"):
             siloscope.measure(frame, siloscope.Calibration("refused", reason="no-frame-answers"))
         with pytest.raises(InputError):

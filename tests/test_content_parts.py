@@ -80,7 +80,7 @@ class TestDensity:
     def test_what_contradicts_itself_is_refused(self) -> None:
         for bad in ({"density": 600.0, "product": "wheat"}, {"density_std": 3.0}, {"density": math.nan}):
             with pytest.raises(UsageError):
-                choose(**bad)  # type: ignore[arg-type]
+                choose(**bad)
 
 
 class TestCapacity:
@@ -143,7 +143,7 @@ class TestCapacity:
     def test_lengths_that_can_not_be(self) -> None:
         for bad in ({"diameter": math.nan}, {"cylinder": -1.0}, {"cone": 1e6}, {"outlet_length": -0.1}):
             with pytest.raises(UsageError):
-                Datasheet(**bad)  # type: ignore[arg-type]
+                Datasheet(**bad)
 
 
 class TestBareClouds:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,9 +14,12 @@ from siloscope import Calibration
 from siloscope.cli import main
 from siloscope.reporting.demo import METHODS, SCENE, scenes
 
+Done = tuple[Path, dict[str, Any]]
+"""Folder and document of a demo."""
+
 
 @pytest.fixture(scope="module")
-def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict]:
+def done(tmp_path_factory: pytest.TempPathFactory) -> Done:
     import contextlib
     import io
 
@@ -34,7 +38,7 @@ def test_discharge_runs_from_full_to_empty() -> None:
     assert len({scene.seed for scene in scenes(5)}) == 5, "each frame has its own noise"
 
 
-def test_document_has_every_frame_and_method(done: tuple[Path, dict]) -> None:
+def test_document_has_every_frame_and_method(done: Done) -> None:
     _, document = done
     assert document["schema"] == "siloscope.demo/1"
     assert len(document["frames"]) == 4
@@ -42,7 +46,7 @@ def test_document_has_every_frame_and_method(done: tuple[Path, dict]) -> None:
         assert set(frame["methods"]) == set(METHODS)
 
 
-def test_full_silo_is_refused_and_empty_one_is_found_to_a_millimetre(done: tuple[Path, dict]) -> None:
+def test_full_silo_is_refused_and_empty_one_is_found_to_a_millimetre(done: Done) -> None:
     first, last = (done[1]["frames"][i]["methods"]["surface"] for i in (0, -1))
     assert first["estimate"]["status"] == "refused"
     assert first["pc_average_distance_m"] is None
@@ -50,7 +54,7 @@ def test_full_silo_is_refused_and_empty_one_is_found_to_a_millimetre(done: tuple
     assert last["pc_average_distance_m"] < 1e-3
 
 
-def test_the_content_of_every_frame_is_measured(done: tuple[Path, dict]) -> None:
+def test_the_content_of_every_frame_is_measured(done: Done) -> None:
     truth = [frame["truth"]["content"]["volume"] for frame in done[1]["frames"]]
     found = [content["volume_m3"] for content in done[1]["contents"]]
     capacity = done[1]["contents"][-1]["capacity_m3"]
@@ -58,7 +62,7 @@ def test_the_content_of_every_frame_is_measured(done: tuple[Path, dict]) -> None
         assert volume == pytest.approx(true, abs=5e-3 * capacity)
 
 
-def test_page_is_whole_and_alone(done: tuple[Path, dict]) -> None:
+def test_page_is_whole_and_alone(done: Done) -> None:
     html = (done[0] / "report.html").read_text("utf-8")
     assert html.count("data:image/png;base64,") == 9
     assert len(html) < 5_000_000
@@ -67,7 +71,7 @@ def test_page_is_whole_and_alone(done: tuple[Path, dict]) -> None:
     assert "nan" not in words
 
 
-def test_frame_beside_the_page_is_located_again(done: tuple[Path, dict], capsys: pytest.CaptureFixture[str]) -> None:
+def test_frame_beside_the_page_is_located_again(done: Done, capsys: pytest.CaptureFixture[str]) -> None:
     out = done[0]
     given = ["locate", str(out / "frame.png"), "--camera", str(out / "camera.json"), "--sensor", "orbbec-astra-s"]
     assert main([*given, "--json"]) == 0
@@ -82,7 +86,7 @@ def test_place_that_cannot_be_written_is_wrong_usage(tmp_path: Path, capsys: pyt
     assert str(tmp_path / "file") in capsys.readouterr().err
 
 
-def test_its_calibration_can_be_continued(done: tuple[Path, dict], tmp_path: Path) -> None:
+def test_its_calibration_can_be_continued(done: Done, tmp_path: Path) -> None:
     frame, calibration = str(done[0] / "frame.png"), str(done[0] / "calibration.json")
     assert main(["calibrate", frame, "--continue", calibration, "-o", str(tmp_path / "silo.json")]) == 0
     assert Calibration.load(tmp_path / "silo.json").counts["used"] == 4

@@ -33,7 +33,7 @@ def run(name: str, *arguments: str, monkeypatch: pytest.MonkeyPatch) -> ModuleTy
 
 def degrees_apart(one: np.ndarray, other: np.ndarray) -> float:
     sine = np.linalg.norm(np.cross(one, other)) / np.linalg.norm(one) / np.linalg.norm(other)
-    return float(np.degrees(np.arcsin(min(1.0, sine))))
+    return float(np.degrees(np.arcsin(np.minimum(1.0, sine))))
 
 
 def test_every_example_is_tested() -> None:

@@ -6,6 +6,7 @@ import io
 import struct
 import zipfile
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ from siloscope.io import camera_files, writers
 
 @pytest.mark.parametrize("order", ["C", "F"])
 @pytest.mark.parametrize("dtype", ["<u2", ">u2", "<i4", ">f4", "<f8", "<f2"])
-def test_arrays_of_every_order_and_type(tmp_path: Path, order: str, dtype: str) -> None:
+def test_arrays_of_every_order_and_type(tmp_path: Path, order: Literal["C", "F"], dtype: str) -> None:
     values = made.RAW // 16 if dtype.endswith("f2") else made.RAW
     stack = np.asarray([values, values + 1], order=order).astype(dtype)
     path = put(tmp_path, made.npy(stack))
@@ -27,7 +28,7 @@ def test_arrays_of_every_order_and_type(tmp_path: Path, order: str, dtype: str) 
         first, second = source
     expected = values if stack.dtype.kind in "ui" else values * 0.001
     assert np.allclose(first.depth, expected, rtol=1e-3 if dtype.endswith("f2") else 1e-6)
-    assert np.allclose(second.depth, expected + (second.depth - first.depth), rtol=1e-6)  # type: ignore[operator]
+    assert np.allclose(second.depth, expected + (second.depth - first.depth), rtol=1e-6)
     assert np.all(np.asarray(second.depth, float) > np.asarray(first.depth, float))
 
 
@@ -100,7 +101,7 @@ def test_labels_for_all_frames_or_for_each(tmp_path: Path) -> None:
         frames = list(siloscope.open(put(tmp_path, made.npz(depth=stack, labels=labels))))
         assert all(np.array_equal(frame.labels, made.LABELS) for frame in frames)
     cloud = made.npz(points=made.CLOUD, labels=np.arange(len(made.CLOUD)))
-    assert read(put(tmp_path, cloud)).labels.tolist() == list(range(len(made.CLOUD)))  # type: ignore[union-attr]
+    assert read(put(tmp_path, cloud)).labels.tolist() == list(range(len(made.CLOUD)))
 
 
 def test_a_stack_that_was_cut_off_gives_the_frames_before(tmp_path: Path) -> None:

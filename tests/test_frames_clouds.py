@@ -59,7 +59,7 @@ def test_range_grids_that_leave_points_out_are_no_grid(tmp_path: Path) -> None:
     content = ply(
         ASCII, "obj_info num_cols 5", "obj_info num_rows 4", "element vertex 2", *AXES, body=b"1 2 3\n4 5 6\n"
     )
-    assert read(put(tmp_path, content)).points.tolist() == [[1, 2, 3], [4, 5, 6]]  # type: ignore[union-attr]
+    assert read(put(tmp_path, content)).points.tolist() == [[1, 2, 3], [4, 5, 6]]
 
 
 PCD = made.MAKERS["binary.pcd"]()

@@ -103,7 +103,7 @@ def test_folders_of_other_formats(tmp_path: Path, name: str) -> None:
     unit = made.UNIT if name in ("raw.tif", "frame.npz") else None
     first, second = siloscope.open(tmp_path, depth_unit=unit)
     values = [first.depth, second.depth] if first.depth is not None else [first.points, second.points]
-    assert np.array_equal(values[0], values[1], equal_nan=True)  # type: ignore[arg-type]
+    assert np.array_equal(values[0], values[1], equal_nan=True)
 
 
 def test_times_and_gravity_from_the_list_beside(folder: Path) -> None:

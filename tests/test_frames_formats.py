@@ -23,7 +23,7 @@ def test_every_format_opens_by_its_content_alone(tmp_path: Path, name: str) -> N
     assert described["streams"][0]["frames"] == len(frames)
     json.dumps(described)
     for frame in frames:
-        shape = (frame.depth if frame.depth is not None else frame.points[..., 0]).shape  # type: ignore[index]
+        shape = (frame.depth if frame.depth is not None else frame.points[..., 0]).shape
         assert described["streams"][0]["size"] == list(reversed(shape))
         assert str(path) in frame.source
         assert frame.provenance["format"] == source.format

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fuzz_frames
+from siloscope import InputError
 
 MUTATIONS = 150
 
@@ -23,8 +24,8 @@ def test_good_files_break_no_rule_and_some_mutations_are_refused(name: str, tmp_
     path.write_bytes(fuzz_frames.SEEDS[name]())
     assert fuzz_frames.broken_rule(path) is None
     path.write_bytes(path.read_bytes()[:3])
-    with pytest.raises(fuzz_frames.InputError):
-        fuzz_frames._read(path)
+    with pytest.raises(InputError):
+        fuzz_frames.read(path)
 
 
 def test_the_rules_notice_what_they_are_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,7 +33,7 @@ def test_the_rules_notice_what_they_are_for(tmp_path: Path, monkeypatch: pytest.
     path.write_bytes(b"content")
 
     def breaks(action: object) -> str:
-        monkeypatch.setattr(fuzz_frames, "_read", action)
+        monkeypatch.setattr(fuzz_frames, "read", action)
         return fuzz_frames.broken_rule(path) or ""
 
     def hang(_: Path) -> None:

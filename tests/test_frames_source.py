@@ -99,7 +99,7 @@ class FirstOnly(Executor):
 
 def test_frames_decoded_ahead_can_be_left_in_the_middle(png: Path) -> None:
     pool = FirstOnly()
-    frames = iter(siloscope.open([png] * 30, depth_unit=0.001).ahead(pool, 20))
+    frames: Any = iter(siloscope.open([png] * 30, depth_unit=0.001).ahead(pool, 20))
     assert np.array_equal(next(frames).depth, RAW)
     frames.close()
     assert [future.cancelled() for future in pool.given] == [False] + [True] * 20

@@ -46,16 +46,16 @@ class Software:
         self.device.register_info(rs.camera_info.name, "Software D455")
         self.depth_sensor, self.motion_sensor = map(self.device.add_sensor, ("Stereo Module", "Motion Module"))
         self.depth_sensor.add_read_only_option(rs.option.depth_units, made.UNIT)
-        self.depth = self.depth_sensor.add_video_stream(made._depth_stream(rs)).as_video_stream_profile()
-        self.accel = self.motion_sensor.add_motion_stream(made._accel_stream(rs)).as_motion_stream_profile()
+        self.depth = self.depth_sensor.add_video_stream(made.depth_stream(rs)).as_video_stream_profile()
+        self.accel = self.motion_sensor.add_motion_stream(made.accel_stream(rs)).as_motion_stream_profile()
         self.camera = RealSense(self.device, rs)
         self.count = 0
 
     def newest(self) -> Frame:
-        self.motion_sensor.on_motion_frame(made._motion_frame(self.rs, self.accel, self.count))
+        self.motion_sensor.on_motion_frame(made.motion_frame(self.rs, self.accel, self.count))
         time.sleep(0.05)
         pixels = made.depth_frames()[self.count]
-        self.depth_sensor.on_video_frame(made._video_frame(self.rs, self.depth, self.count, pixels))
+        self.depth_sensor.on_video_frame(made.video_frame(self.rs, self.depth, self.count, pixels))
         self.count += 1
         return self.camera.newest()
 
@@ -72,7 +72,7 @@ def without_depth() -> Any:
 
     device = rs.software_device()
     device.register_info(rs.camera_info.name, "Software T265")
-    device.add_sensor("Motion Module").add_motion_stream(made._accel_stream(rs))
+    device.add_sensor("Motion Module").add_motion_stream(made.accel_stream(rs))
     return RealSense(device, rs)
 
 

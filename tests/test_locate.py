@@ -51,7 +51,7 @@ def test_a_mask_and_a_box_leave_the_pose_where_it_is() -> None:
     mask = np.ones(DEPTH.shape, bool)
     mask[:, :40] = False
     for extra in ({"mask": mask}, {"crop": (-5, 5, -5, 5, 0.1, 3.5)}):
-        estimate = siloscope.locate(DEPTH, CAMERA, **extra)  # type: ignore[arg-type]
+        estimate = siloscope.locate(DEPTH, CAMERA, **extra)
         assert estimate.t_x == pytest.approx(SMALL.pose.t_x, abs=1e-4)
 
 

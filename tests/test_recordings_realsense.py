@@ -63,7 +63,7 @@ def test_bit_for_bit_what_the_sdk_plays(tmp_path: Path, suffix: str, compressed:
         units, depth = played["units"], played["depth"]
     frames = list(siloscope.open(path))
     assert np.array_equal([frame.depth for frame in frames], depth)
-    assert np.array_equal(np.float32([frame.depth_unit for frame in frames]), np.float32(units))
+    assert np.array_equal(np.array([frame.depth_unit for frame in frames], np.float32), np.float32(units))
 
 
 def by_the_sdk(*command: str) -> None:
@@ -192,7 +192,7 @@ def _read_before_the_cut(path: Path) -> int:
         source = siloscope.open(path)
     except InputError:
         return 0
-    frames = []
+    frames: list[siloscope.Frame] = []
     with contextlib.suppress(InputError):
         frames.extend(source)
     assert "cut off" in source.problems[-1]

@@ -302,7 +302,7 @@ def test_a_damaged_checksum_is_told(tmp_path: Path) -> None:
         channel = writer.register_channel("/depth", "cdr", schema)
         data = maker.store.serialize_cdr(maker.image(RAW, "16UC1"), "sensor_msgs/msg/Image")
         writer.add_message(channel, START_NS, bytes(data), START_NS)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
     assert np.array_equal(only_frame(path).depth, RAW)
     whole = path.read_bytes()
     flipped = whole.find(RAW.tobytes()) + 99

@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,7 +20,7 @@ SMALL = Camera(width=96, height=72, fx=85.5, fy=85.5, cx=47.5, cy=35.5)
 SHAPES = ("gaussian", "funnel", "mound", "flat", "tilted", "lumpy", "rathole", "tilted+lumpy+rathole", "funnel+lumpy")
 
 
-def small(scene: Scene, **changes: object) -> Scene:
+def small(scene: Scene, **changes: Any) -> Scene:
     return replace(scene, camera=SMALL, **changes)
 
 
@@ -269,21 +270,22 @@ def test_looking_at_aims_the_optical_axis_at_the_vertex() -> None:
 
 @pytest.mark.parametrize("field", ["radius", "cylinder_height", "cone_height", "top", "outlet_radius", "outlet_length"])
 @pytest.mark.parametrize("value", [math.nan, math.inf, -1e9, 1e9])
-def test_impossible_silos_are_refused_by_name(field: str, value: float) -> None:
+def test_impossible_silos_are_refused_by_name(field: str, value: Any) -> None:
     with pytest.raises(UsageError, match=field):
         replace(SILO1.silo, **{field: value})
 
 
 @pytest.mark.parametrize("field", ["bias", "noise"])
 def test_impossible_error_laws_are_refused(field: str) -> None:
-    for value in [(math.nan, 0, 0), (0.0, 0.0), "abc", None]:
+    values: list[Any] = [(math.nan, 0, 0), (0.0, 0.0), "abc", None]
+    for value in values:
         with pytest.raises(UsageError, match=field):
             SensorModel(**{field: value})
 
 
 @pytest.mark.parametrize("field", ["dust", "dropout", "flying", "correlation", "unit", "noise_scale", "min_range"])
 @pytest.mark.parametrize("value", [math.nan, -0.1, math.inf, "x"])
-def test_impossible_sensor_numbers_are_refused_by_name(field: str, value: object) -> None:
+def test_impossible_sensor_numbers_are_refused_by_name(field: str, value: Any) -> None:
     with pytest.raises(UsageError, match=field):
         SensorModel(**{field: value})
 
@@ -319,7 +321,7 @@ def test_unknown_feed_shapes_are_refused(shape: str) -> None:
 @pytest.mark.parametrize("part", ["silo", "pose", "camera", "feed", "sensor", "defects", "seed", "world"])
 def test_parts_of_another_kind_are_refused_by_name(part: str) -> None:
     with pytest.raises(UsageError, match=part):
-        replace(SILO1, **{part: 1.5})
+        replace(SILO1, **{part: 1.5})  # type: ignore[arg-type]
 
 
 def test_a_buried_or_outside_camera_and_bad_threads_are_refused() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -244,7 +245,7 @@ def test_noise_has_no_surface_and_nothing_has_no_depth() -> None:
         {"seed": "x"},
     ],
 )
-def test_impossible_defects_are_refused(changes: dict[str, object]) -> None:
+def test_impossible_defects_are_refused(changes: dict[str, Any]) -> None:
     with pytest.raises(UsageError):
         replace(SILO1, camera=SMALL, defects=Defects(**changes)).render()
 

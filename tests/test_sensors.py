@@ -42,7 +42,7 @@ BAD = {
 def test_what_is_no_profile_is_refused_by_name(name: str, tmp_path: Path) -> None:
     content, told = BAD[name]
     path = tmp_path / "mine.toml"
-    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    path.write_bytes(content if isinstance(content, bytes) else str(content).encode())
     with pytest.raises(InputError) as refused:
         sensors.load(path)
     assert str(path) in str(refused.value)

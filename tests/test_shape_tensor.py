@@ -132,7 +132,7 @@ def test_threads_change_no_bit() -> None:
     depth = scene.render().measured
     one, two = (siloscope.locate(depth, scene.camera, method="shape-tensor", threads=n) for n in (1, 2))
     assert one.pose == two.pose
-    assert np.array_equal(one.covariance, two.covariance)  # type: ignore[arg-type]
+    assert np.array_equal(one.covariance, two.covariance)
     assert one.silo == two.silo
 
 

@@ -47,8 +47,8 @@ def test_the_grid_keeps_the_mean_of_every_voxel() -> None:
 
 def test_neighbours_are_the_nearest() -> None:
     expected = reference.nearest_neighbours(CLOUD, 30)
-    distances = [np.linalg.norm(CLOUD[index] - CLOUD[:, None], axis=2) for index in (NEAR, expected)]
-    assert np.allclose(*distances, rtol=0, atol=1e-12)
+    found, nearest = (np.linalg.norm(CLOUD[index] - CLOUD[:, None], axis=2) for index in (NEAR, expected))
+    assert np.allclose(found, nearest, rtol=0, atol=1e-12)
 
 
 def test_normals_are_the_oracles() -> None:

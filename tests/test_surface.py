@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -31,7 +32,7 @@ NAMES = ("silo1", "silo2", "silo3")
 POSE = ("r_x", "r_y", "t_x", "t_y")
 
 
-def fit(scene: Scene, sensor: str | None, **known: float) -> Estimate:
+def fit(scene: Scene, sensor: str | None, **known: Any) -> Estimate:
     depth = np.nan_to_num(scene.render().measured).astype(np.float32)
     return fit_depth(depth, scene.camera, sensors.load(sensor), **known)
 
@@ -124,7 +125,7 @@ def test_noise_that_neighbouring_pixels_share_hides_no_wall() -> None:
     assert max(gap(f, s) for f, s in zip(found, scenes, strict=True) if f.ok) < 30.0
 
 
-def error_over_deviation(flaw: dict[str, float]) -> float:
+def error_over_deviation(flaw: dict[str, Any]) -> float:
     """Of the pose's parameters, over a few scenes and draws of a noise that the profile does not know."""
     ratios = []
     for seed in (3001, 3002, 3003):
@@ -305,7 +306,7 @@ def test_stuck_feed_that_is_evened_out_over_a_cone_widens_the_deviation() -> Non
 
 
 def test_a_cone_of_wall_above_and_feed_below_leaves_its_slope_open() -> None:
-    flaws = {"incidence_gain": 0.05, "flying": 0.5, "dropout": 0.05, "unit": 0.001, "correlation": 0.3}
+    flaws: dict[str, Any] = {"incidence_gain": 0.05, "flying": 0.5, "dropout": 0.05, "unit": 0.001, "correlation": 0.3}
     sensor = replace(sensor_model("orbbec-astra", 7046), **flaws)
     scene = random_scene(7046, Feed("funnel", 0.226395, seed=7046), sensor=sensor)
     scene = replace(scene, defects=defects("oval,auger", 7046))

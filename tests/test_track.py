@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,7 +140,7 @@ def test_no_frames_at_all() -> None:
     "times", [{"interval": 0.0}, {"interval": float("nan")}, {"interval": 1e300}, {"start": START},
               {"interval": 60.0, "start": float("inf")}],
 )  # fmt: skip
-def test_times_that_can_not_be_are_refused(times: dict[str, float]) -> None:
+def test_times_that_can_not_be_are_refused(times: dict[str, Any]) -> None:
     with pytest.raises(UsageError, match="interval"):
         siloscope.track([], known(scene(Feed("flat", 0.4))), **times)
 

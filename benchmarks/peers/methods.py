@@ -9,7 +9,7 @@ import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
@@ -117,7 +117,7 @@ def pyransac(frame: Shown, repeats: int) -> list[Found]:
         centre, axis, _, inliers = pyransac3d.Cylinder().fit(_voxels(frame.points()), thresh=0.03, maxIteration=2000)
         return SiloPose.from_axis(axis, centre) if len(inliers) else None
 
-    return [_timed(lambda seed=seed: run(seed)) for seed in range(repeats)]
+    return [_timed(partial(run, seed)) for seed in range(repeats)]
 
 
 def open3d_icp(start: str) -> Callable[[Shown, int], list[Found]]:
@@ -125,7 +125,7 @@ def open3d_icp(start: str) -> Callable[[Shown, int], list[Found]]:
 
     def answers(frame: Shown, repeats: int) -> list[Found]:
         target = _open3d_target(target_of(frame.silo))
-        return [_timed(lambda seed=seed: _open3d(frame, target, _start(frame, start, seed))) for seed in range(repeats)]
+        return [_timed(partial(_open3d, frame, target, _start(frame, start, seed))) for seed in range(repeats)]
 
     return answers
 
@@ -161,7 +161,7 @@ def small_gicp(start: str) -> Callable[[Shown, int], list[Found]]:
 
     def answers(frame: Shown, repeats: int) -> list[Found]:
         target = _gicp_target(frame.silo)
-        return [_timed(lambda seed=seed: _gicp(frame, target, _start(frame, start, seed))) for seed in range(repeats)]
+        return [_timed(partial(_gicp, frame, target, _start(frame, start, seed))) for seed in range(repeats)]
 
     return answers
 

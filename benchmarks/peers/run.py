@@ -85,7 +85,7 @@ def _row(method: Method, results: Sequence[Result]) -> tuple[Cell, ...]:
     failed = int(np.count_nonzero(~(off <= FAILURE)))
     kinds = [_median([value for r in results if r.frame.kind == kind for value in r.off]) for kind in KINDS]
     worst = 1e3 * float(np.nanmax(off)) if np.isfinite(off).any() else None
-    rest = (*kinds, worst, f"{failed} of {len(off)}")
+    rest: tuple[Cell, ...] = (*kinds, worst, f"{failed} of {len(off)}")
     return (method.name, method.told, float(np.median(times)), max(times), *rest)
 
 
@@ -171,7 +171,7 @@ def plot(results: Sequence[Result], path: Path) -> None:
     names = [f"{place}  {_named(method)}" for place, method in enumerate(METHODS, start=1)]
     made.text(0.01, 0.0, "\n".join(names[:7]), fontsize=9, color=INK, va="bottom")
     made.text(0.51, 0.0, "\n".join(names[7:]), fontsize=9, color=INK, va="bottom")
-    made.get_layout_engine().set(rect=(0.0, 0.14, 1.0, 0.86))  # type: ignore[union-attr,call-arg]
+    made.get_layout_engine().set(rect=(0.0, 0.14, 1.0, 0.86))  # type: ignore[call-arg]
     heading(made, "One frame, one axis: nearer is lower, quicker is to the left (ours in blue)")
     path.write_bytes(png(made, 80))
 

@@ -35,16 +35,16 @@ def record(path: str, compressed: bool = True) -> None:
     device.register_info(rs.camera_info.serial_number, "000123")
     depth_sensor, motion_sensor = device.add_sensor("Stereo Module"), device.add_sensor("Motion Module")
     depth_sensor.add_read_only_option(rs.option.depth_units, UNIT)
-    depth = depth_sensor.add_video_stream(_depth_stream(rs)).as_video_stream_profile()
-    accel = motion_sensor.add_motion_stream(_accel_stream(rs)).as_motion_stream_profile()
+    depth = depth_sensor.add_video_stream(depth_stream(rs)).as_video_stream_profile()
+    accel = motion_sensor.add_motion_stream(accel_stream(rs)).as_motion_stream_profile()
     recorder = rs.recorder(path, device, compressed)
     sensors, queue = recorder.query_sensors(), rs.frame_queue(50)
     for sensor, profile in zip(sensors, (depth, accel), strict=True):
         sensor.open(profile)
         sensor.start(queue)
     for number, pixels in enumerate(depth_frames()):
-        depth_sensor.on_video_frame(_video_frame(rs, depth, number, pixels))
-        motion_sensor.on_motion_frame(_motion_frame(rs, accel, number))
+        depth_sensor.on_video_frame(video_frame(rs, depth, number, pixels))
+        motion_sensor.on_motion_frame(motion_frame(rs, accel, number))
         time.sleep(0.05)
     time.sleep(0.3)
     for sensor in sensors:
@@ -52,7 +52,7 @@ def record(path: str, compressed: bool = True) -> None:
         sensor.close()
 
 
-def _depth_stream(rs: Any) -> Any:
+def depth_stream(rs: Any) -> Any:
     lens = rs.intrinsics()
     lens.width, lens.height, lens.fx, lens.fy, lens.ppx, lens.ppy = WIDTH, HEIGHT, 38.5, 38.75, 31.25, 23.5
     lens.model, lens.coeffs = rs.distortion.brown_conrady, [0.0] * 5
@@ -62,20 +62,20 @@ def _depth_stream(rs: Any) -> Any:
     return stream
 
 
-def _accel_stream(rs: Any) -> Any:
+def accel_stream(rs: Any) -> Any:
     stream = rs.motion_stream()
     stream.type, stream.index, stream.uid, stream.fps = rs.stream.accel, 0, 2, 100
     stream.fmt, stream.intrinsics = rs.format.motion_xyz32f, rs.motion_device_intrinsic()
     return stream
 
 
-def _video_frame(rs: Any, profile: Any, number: int, pixels: NDArray[np.uint16]) -> Any:
+def video_frame(rs: Any, profile: Any, number: int, pixels: NDArray[np.uint16]) -> Any:
     frame = rs.software_video_frame()
     frame.stride, frame.bpp, frame.pixels, frame.depth_units = WIDTH * 2, 2, pixels, UNIT
     return _stamped(rs, frame, profile, number)
 
 
-def _motion_frame(rs: Any, profile: Any, number: int) -> Any:
+def motion_frame(rs: Any, profile: Any, number: int) -> Any:
     frame, value = rs.software_motion_frame(), rs.vector()
     value.x, value.y, value.z = ACCELERATION
     frame.data = value
@@ -97,7 +97,8 @@ def play(path: str, out: str) -> None:
     sensor, queue = device.query_sensors()[0], rs.frame_queue(50)
     sensor.open(sensor.get_stream_profiles()[0])
     sensor.start(queue)
-    units, frames = [], []
+    units: list[float] = []
+    frames: list[Any] = []
     while len(frames) < len(depth_frames()):
         arrived, frame = queue.try_wait_for_frame(5000)
         if not arrived:
