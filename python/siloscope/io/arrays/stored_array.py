@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+import io
 import math
-import re
+import warnings
 from dataclasses import dataclass
 from typing import IO, Any
 
 import numpy as np
+from numpy.lib import format as layout
 from numpy.typing import NDArray
 
 from siloscope.errors import InputError
 
-MAGIC = b"\x93NUMPY"
+MAGIC = layout.MAGIC_PREFIX
 _LONGEST_HEADER = 10_000
-_DTYPE = re.compile(r"'descr'\s*:\s*'([<>|=]?)([a-zA-Z])(\d+)'")
-_ORDER = re.compile(r"'fortran_order'\s*:\s*(True|False)")
-_SHAPE = re.compile(r"'shape'\s*:\s*\(((?: *\d{1,20} *(?:,|(?=\)))){0,8} *)\)", re.ASCII)
+_MOST_SIDES = 8
 _NUMBERS = {"f": (2, 4, 8), "i": (1, 2, 4, 8), "u": (1, 2, 4, 8)}
 
 
@@ -80,43 +80,40 @@ def stored_array(file: IO[bytes], name: str, size: int, *, text: bool = False) -
     Raises `InputError` for objects (which would run code when read), structures and other dtypes that are no
     numbers; `text` also allows strings.
     """
-    header, offset = _header(file, name, size)
-    order, shape = _ORDER.search(header), _SHAPE.search(header)
-    if order is None or shape is None:
+    shape, fortran, dtype, offset = _header(file, name)
+    if offset > size or len(shape) > _MOST_SIDES or any(side < 0 for side in shape):
         raise _damaged(name)
-    sides = tuple(int(side) for side in shape[1].split(",") if side.strip(" "))
-    dtype = _dtype(name, header, text)
-    return StoredArray(file, name, sides, dtype, order[1] == "True", offset, size - offset)
+    _check_type(name, dtype, text)
+    return StoredArray(file, name, shape, dtype, fortran, offset, size - offset)
 
 
-def _header(file: IO[bytes], name: str, size: int) -> tuple[str, int]:
-    """The header's text and where the values start."""
+def _header(file: IO[bytes], name: str) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
+    """Shape, whether in Fortran's order, type, and where the values start."""
     try:
-        start = file.read(_LONGEST_HEADER)
+        head = io.BytesIO(file.read(_LONGEST_HEADER))
     except Exception as error:  # as above
         raise InputError(f"{name}: can't be decompressed ({error}); save it again") from None
-    first = 10 if start[6:7] == b"\x01" else 12
-    offset = first + int.from_bytes(start[8:first], "little")
-    if not start.startswith(MAGIC) or len(start) < first or offset > min(size, _LONGEST_HEADER):
-        raise _damaged(name)
-    return start[first:offset].decode("latin-1"), offset
+    try:
+        old = layout.read_magic(head) == (1, 0)
+        read = layout.read_array_header_1_0 if old else layout.read_array_header_2_0
+        with warnings.catch_warnings(action="ignore"):
+            return *read(head, max_header_size=_LONGEST_HEADER), head.tell()
+    except Exception:  # the header is a Python literal: damage fails in the tokenizer, the parser or the type's name
+        raise _damaged(name) from None
 
 
 def _damaged(name: str) -> InputError:
     return InputError(f"{name}: the array's header is damaged; save it again with numpy.save")
 
 
-def _dtype(name: str, header: str, text: bool) -> np.dtype[Any]:
-    found = _DTYPE.search(header)
-    if found and text and found[2] == "U":
-        return np.dtype(f"{found[1]}U{found[3]}")
-    if found is None or found[2] == "O":
+def _check_type(name: str, dtype: np.dtype[Any], text: bool) -> None:
+    if dtype.hasobject or dtype.kind == "V":
         raise InputError(
             f"{name}: holds Python objects or structures, which are not read (they can run code); "
             "save a plain array of numbers: numpy.save(file, depth.astype('float32'))"
         )
-    if int(found[3]) not in _NUMBERS.get(found[2], ()):
-        raise InputError(
-            f"{name}: values of type '{found[2]}{found[3]}' are no depths; save uint16 raw units or float32 metres"
-        )
-    return np.dtype("".join(found.groups()))
+    if text and dtype.kind == "U" and dtype.itemsize:
+        return
+    if dtype.itemsize not in _NUMBERS.get(dtype.kind, ()):
+        kind = dtype.str.lstrip("<>|=")
+        raise InputError(f"{name}: values of type '{kind}' are no depths; save uint16 raw units or float32 metres")

@@ -6,39 +6,27 @@ import struct
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO
 
 from siloscope.errors import InputError
+from siloscope.io.recordings.containers.file_recording import FileRecording, Place
 from siloscope.io.recordings.dialects import source
-from siloscope.io.recordings.recording import Entry, Recording, Topic, decompress, wire
+from siloscope.io.recordings.recording import Entry, Topic, decompress
 from siloscope.io.recordings.wire import Wire
 from siloscope.io.source import Format, FrameSource, Options
 
 MAGIC = b"\x89MCAP0\r\n"
 _FOOTER, _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK, _DATA_END = 2, 3, 4, 5, 6, 15
-_CUT = "the recording is cut off or was never closed; frames before are read"
 
 
-class Mcap(Recording):
+class Mcap(FileRecording):
     """An MCAP file with ROS 1 or CDR messages."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self.file: BinaryIO = path.open("rb")
-        self.size = path.stat().st_size
         self._schemas: dict[int, str] = {}
         self._channels: dict[int, Topic] = {}
         self._chunks: list[tuple[str, int, int, int, int]] = []
-        self._open_chunk: tuple[int, bytes] | None = None
-        try:
-            self._index()
-        except InputError as error:
-            self.damage = f"{self.name}: {error}"
-        except BaseException:
-            self.file.close()
-            raise
-        for topic in self.topics.values():
-            topic.entries.sort(key=lambda entry: entry.time_ns)
+        self._read_index()
 
     def _index(self) -> None:
         at = len(MAGIC)
@@ -50,19 +38,12 @@ class Mcap(Recording):
             if kind == _CHUNK:
                 self._add_chunk(at, size)
             elif kind == _MESSAGE:
-                self._add_message(Wire(self._bytes(at, min(size, 22))), (None, at + 22, at + size))
+                self._add_message(Wire(self._bytes(at, min(size, 22))), Place(None, at + 22, at + size))
             elif kind in (_SCHEMA, _CHANNEL):
                 self._define(kind, self._bytes(at, size))
             at += size
             if at > self.size:
-                raise InputError(_CUT)
-
-    def _bytes(self, at: int, size: int) -> bytes:
-        """Bytes of the file; nothing is allocated for more than there are."""
-        if at + size > self.size:
-            raise InputError(_CUT)
-        self.file.seek(at)
-        return self.file.read(size)
+                raise InputError("the recording is cut off or was never closed; frames before are read")
 
     def _define(self, kind: int, data: bytes | memoryview) -> None:
         record = Wire(data)
@@ -86,16 +67,12 @@ class Mcap(Recording):
         for kind, start, end in _records(self._chunk(number), cut):
             record = memoryview(self._chunk(number))[start:end]
             if kind == _MESSAGE:
-                self._add_message(Wire(record), (number, start + 22, end))
+                self._add_message(Wire(record), Place(number, start + 22, end))
             elif kind in (_SCHEMA, _CHANNEL):
                 self._define(kind, record)
 
-    def _chunk(self, number: int) -> bytes:
-        if self._open_chunk is None or self._open_chunk[0] != number:
-            self._open_chunk = number, self._read_chunk(*self._chunks[number])
-        return self._open_chunk[1]
-
-    def _read_chunk(self, compression: str, at: int, stored: int, size: int, crc: int) -> bytes:
+    def _unpack(self, number: int) -> bytes:
+        compression, at, stored, size, crc = self._chunks[number]
         cut = at + stored > self.size
         data = self._bytes(at, min(stored, self.size - at))
         plain = decompress(compression, data, size, cut=cut)
@@ -103,24 +80,12 @@ class Mcap(Recording):
             raise InputError("a chunk of messages fails its checksum; frames before are read")
         return plain
 
-    def _add_message(self, head: Wire, where: tuple[int | None, int, int]) -> None:
+    def _add_message(self, head: Wire, where: Place) -> None:
         topic = self._channels.get(head.u16())
         head.u32()
         time_ns = head.u64()
         if topic:
             topic.entries.append(Entry(time_ns, where))
-
-    def read(self, topic: Topic, entry: Entry) -> Wire:
-        """One message."""
-        number, start, end = entry.where
-        if number is None:
-            return wire(topic.encoding, self._bytes(start, end - start))
-        return wire(topic.encoding, memoryview(self._chunk(number))[start:end])
-
-    def close(self) -> None:
-        """Lets go of the file."""
-        self._open_chunk = None
-        self.file.close()
 
 
 def _records(chunk: bytes, cut: bool) -> Iterator[tuple[int, int, int]]:

@@ -10,15 +10,16 @@ import json
 import struct
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, BinaryIO, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.errors import InputError
 from siloscope.io.recordings import gravity, ros_messages
+from siloscope.io.recordings.containers.file_recording import FileRecording, Place
 from siloscope.io.recordings.recorded import RecordedSource
-from siloscope.io.recordings.recording import Entry, Recording, Topic, or_none
+from siloscope.io.recordings.recording import Entry, Topic, or_none
 from siloscope.io.recordings.streams import Stream
 from siloscope.io.recordings.wire import Wire
 from siloscope.io.source import Format, Options, check_image_size
@@ -48,26 +49,18 @@ class Element(NamedTuple):
     end: int
 
 
-class Mkv(Recording):
+class Mkv(FileRecording):
     """A Matroska file with the tracks and attachments of ``k4arecorder``."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self.file: BinaryIO = path.open("rb")
-        self.size = path.stat().st_size
         self.sizes: dict[str, tuple[int, int, str]] = {}
         self.attachments: dict[str, bytes] = {}
         self.tags: dict[str, str] = {}
         self.start_ns = 0
         self._scale_ns = 1_000_000
         self._tracks: dict[int, Topic] = {}
-        try:
-            self._index()
-        except InputError as error:
-            self.damage = f"{self.name}: {error}"
-        except BaseException:
-            self.file.close()
-            raise
+        self._read_index()
 
     def _index(self) -> None:
         readers = {
@@ -98,13 +91,6 @@ class Mkv(Recording):
             if at > end:
                 raise InputError("an element runs over the end of its parent; frames before are read")
 
-    def _bytes(self, at: int, size: int) -> bytes:
-        self.file.seek(at)
-        data = self.file.read(max(0, min(size, self.size - at)))
-        if len(data) < size:
-            raise InputError("the recording is cut off; frames before are read")
-        return data
-
     def _content(self, element: Element) -> bytes:
         size = element.end - element.start
         if size > _LARGEST_METADATA:
@@ -127,7 +113,7 @@ class Mkv(Recording):
             if track.id == _TRACK:
                 values = self._values(track)
                 name, codec = (values.get(key, b"").decode("utf-8", "replace") for key in (_NAME, _CODEC))
-                self._tracks[int.from_bytes(values.get(_NUMBER, b""), "big")] = self.declare(name, codec, "raw")
+                self._tracks[int.from_bytes(values.get(_NUMBER, b""), "big")] = self.declare(name, codec, "ros1")
                 picture = values.get(_PRIVATE, b"")
                 if len(picture) >= 20:
                     width, height = struct.unpack_from("<ii", picture, 4)
@@ -169,17 +155,8 @@ class Mkv(Recording):
         laced = head[length + 2] & 0x06
         topic = self._tracks.get(number)
         if topic and not laced and block.end <= self.size:
-            where = block.start + length + 3, block.end
+            where = Place(None, block.start + length + 3, block.end)
             topic.entries.append(Entry((cluster_time + time) * self._scale_ns, where))
-
-    def read(self, topic: Topic, entry: Entry) -> Wire:
-        """The content of one block."""
-        start, end = entry.where
-        return Wire(self._bytes(start, end - start))
-
-    def close(self) -> None:
-        """Lets go of the file."""
-        self.file.close()
 
 
 def _variable(data: bytes, keep_mark: bool) -> tuple[int, int]:

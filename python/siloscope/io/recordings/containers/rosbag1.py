@@ -9,12 +9,12 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 from pathlib import Path
-from typing import BinaryIO, NamedTuple
+from typing import NamedTuple
 
 from siloscope.errors import InputError
+from siloscope.io.recordings.containers.file_recording import FileRecording, Place
 from siloscope.io.recordings.dialects import source
-from siloscope.io.recordings.recording import Entry, Recording, Topic, decompress, wire
-from siloscope.io.recordings.wire import Wire
+from siloscope.io.recordings.recording import Entry, Topic, decompress
 from siloscope.io.source import Format, FrameSource, Options
 
 MAGIC = b"#ROSBAG V2.0\n"
@@ -30,25 +30,14 @@ class _Record(NamedTuple):
     size: int
 
 
-class Rosbag1(Recording):
+class Rosbag1(FileRecording):
     """A ROS 1 bag."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self.file: BinaryIO = path.open("rb")
-        self.size = path.stat().st_size
         self._connections: dict[int, Topic] = {}
         self._chunks: list[tuple[str, int, int, int, bool]] = []
-        self._open_chunk: tuple[int, bytes] | None = None
-        try:
-            self._index()
-        except InputError as error:
-            self.damage = f"{self.name}: {error}"
-        except BaseException:
-            self.file.close()
-            raise
-        for topic in self.topics.values():
-            topic.entries.sort(key=lambda entry: entry.time_ns)
+        self._read_index()
 
     def _index(self) -> None:
         at, index_at = len(MAGIC), 0
@@ -79,13 +68,6 @@ class Rosbag1(Recording):
     def _length(self, at: int) -> int:
         return int(struct.unpack("<I", self._bytes(at, 4))[0])
 
-    def _bytes(self, at: int, size: int) -> bytes:
-        """Bytes of the file; nothing is allocated for more than there are."""
-        if at + size > self.size:
-            raise InputError("the recording is cut off; frames before are read")
-        self.file.seek(at)
-        return self.file.read(size)
-
     def _data(self, record: _Record) -> bytes:
         return self._bytes(record.at, record.size)
 
@@ -100,13 +82,11 @@ class Rosbag1(Recording):
             if fields.get("op") == bytes([_CONNECTION]):
                 self._connect(fields, self._chunk(number)[start:end])
             elif fields.get("op") == bytes([_MESSAGE]):
-                self._add_message(fields, (number, start, end))
+                self._add_message(fields, Place(number, start, end))
 
-    def _chunk(self, number: int) -> bytes:
-        if self._open_chunk is None or self._open_chunk[0] != number:
-            compression, at, stored, size, cut = self._chunks[number]
-            self._open_chunk = number, decompress(compression, self._bytes(at, stored), size, cut=cut)
-        return self._open_chunk[1]
+    def _unpack(self, number: int) -> bytes:
+        compression, at, stored, size, cut = self._chunks[number]
+        return decompress(compression, self._bytes(at, stored), size, cut=cut)
 
     def _connect(self, fields: Fields, data: bytes) -> None:
         # Recorders differ in which of the two places holds the topic.
@@ -115,21 +95,11 @@ class Rosbag1(Recording):
         if name:
             self._connections[_number(fields, "conn", "<I")] = self.declare(name, kind, "ros1")
 
-    def _add_message(self, fields: Fields, where: tuple[int, int, int]) -> None:
+    def _add_message(self, fields: Fields, where: Place) -> None:
         topic = self._connections.get(_number(fields, "conn", "<I"))
         if topic:
             seconds, nanoseconds = struct.unpack("<II", fields.get("time", bytes(8))[:8].ljust(8, b"\0"))
             topic.entries.append(Entry(seconds * 1_000_000_000 + nanoseconds, where))
-
-    def read(self, topic: Topic, entry: Entry) -> Wire:
-        """One message."""
-        number, start, end = entry.where
-        return wire(topic.encoding, memoryview(self._chunk(number))[start:end])
-
-    def close(self) -> None:
-        """Lets go of the file."""
-        self._open_chunk = None
-        self.file.close()
 
 
 def _records(chunk: bytes, cut: bool) -> Iterator[tuple[Fields, int, int]]:
