@@ -35,11 +35,13 @@ from typing import Any
 
 import numpy as np
 from PIL import Image
-from tests.oracle import KINDS, NO_SILO, store
-from tests.oracle.judging import HEAD, Verdict, judge, row
 
 import siloscope
 from siloscope import Camera, Frame
+
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+from oracle import KINDS, NO_SILO, store
+from oracle.judging import HEAD, Verdict, judge, row
 
 MODES = {
     "S": "the sensor's profile",
