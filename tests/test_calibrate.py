@@ -18,10 +18,10 @@ from siloscope.cli import main
 from siloscope.estimation.surface import fit_depth
 from siloscope.fusion.relinearize import straightened
 from siloscope.fusion.solve import LENGTHS, SCALE, Stack, sums
+from siloscope.parameters import PARAMETERS
 from siloscope.reproduction.discharges import real
 from siloscope.simulation import ASTRA_S, Feed, Scene, discharge
 from siloscope.simulation.scenarios import random_scene, scenario
-from siloscope.types.frame_factor import PARAMETERS
 
 SILO3 = replace(scenario("silo3"), sensor=ASTRA_S)
 

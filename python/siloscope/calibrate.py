@@ -25,13 +25,14 @@ from siloscope.fusion.solve import Fused, Stack, fuse, sums
 from siloscope.io import FrameSource
 from siloscope.io import open as open_frames
 from siloscope.locate import locate
+from siloscope.parameters import PARAMETERS
 from siloscope.reasons import CALIBRATION_REFUSALS, sentence
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration, Evidence, FrameRecord
 from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
-from siloscope.types.frame_factor import PARAMETERS, FrameFactor, SummedFactor
+from siloscope.types.frame_factor import FrameFactor, SummedFactor
 from siloscope.types.move import Move
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry
@@ -173,12 +174,10 @@ def _short(value: Any) -> Any:
 
 def _profile(table: Any) -> SensorProfile:
     """The sensor profile that a calibration's ``config`` describes."""
-    try:
-        bias, bias_std = (tuple(table[key][name] for name in sensors.BIAS) for key in ("bias", "bias_std"))
-        noise = None if table["noise"] is None else tuple(table["noise"][name] for name in sensors.NOISE)
-        return SensorProfile(table["name"], bias, bias_std, noise)
-    except (TypeError, KeyError):
-        raise InputError("the calibration to continue does not tell its sensor; calibrate all frames anew") from None
+    profile = sensors.from_record(table)
+    if profile is None:
+        raise InputError("the calibration to continue does not tell its sensor; calibrate all frames anew")
+    return profile
 
 
 @dataclass(frozen=True)

@@ -4,23 +4,22 @@ from __future__ import annotations
 
 import itertools
 import math
-import tomllib
 from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.errors import InputError, UsageError
+from siloscope.parameters import GRAVITY
 
-GRAVITY = 9.81
-"""m/s²."""
+if TYPE_CHECKING:
+    from siloscope.schema.product import ProductFile
+
 DENSITIES = (10.0, 10_000.0)
 """Bulk densities that a silo may hold, kg/m³."""
-LARGEST_FILE = 100_000
-"""Bytes; a product is a few lines of text."""
 STEPS = 400
 """Slices of a column in which the pressure is followed."""
 
@@ -122,53 +121,36 @@ def choose(
 
 def products() -> dict[str, Density]:
     """The products that come with siloscope, by name."""
-    table = tomllib.loads(resources.files(__package__).joinpath("products.toml").read_text("utf-8"))
-    return {name: _product(name, entry) for name, entry in table.items()}
+    from siloscope.schema import files, product
+
+    content = resources.files(__package__).joinpath("products.toml").read_bytes()
+    table = files.from_toml(content, "products.toml", "table of products", product.REMEDY)
+    return {name: _density(product.parse(entry, name), name) for name, entry in table.items()}
 
 
-def load(product: str) -> Density:
+def load(name: str) -> Density:
     """A product by name, or from a TOML file with ``density`` and what else `Density` has."""
+    from siloscope.schema import product
+
     known = products()
-    if product in known:
-        return known[product]
-    path = Path(product)
+    if name in known:
+        return known[name]
+    path = Path(name)
     if not path.is_file():
-        raise UsageError(f"unknown product '{product}'; give a TOML file's path or one of: {', '.join(sorted(known))}")
-    try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise InputError(f"{path}: too large for a product; give a TOML file with a density")
-        table = tomllib.loads(path.read_text("utf-8"))
-    except OSError as error:
-        raise InputError(f"{path}: can't be read ({error.strerror}); check its name and permissions") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: no TOML product ({error}); docs/measuring.md has an example") from None
-    return _product(str(table.pop("name", path.stem)), table)
+        raise UsageError(f"unknown product '{name}'; give a TOML file's path or one of: {', '.join(sorted(known))}")
+    return _density(product.read(path), path.stem)
 
 
-def _product(name: str, table: Any) -> Density:
-    known = {"density", "density_std", "source", "friction", "pressure_ratio", "compaction"}
-    if not isinstance(table, dict) or "density" not in table:
-        raise InputError(f"{name}: a product needs a density, kg/m³")
-    unknown = sorted(set(table) - known)
-    if unknown:
-        raise InputError(f"{name}: unknown entry '{unknown[0]}'; known are {', '.join(sorted(known))}")
-    numbers = {key: _finite(f"{name}: {key}", table[key]) for key in ("density_std", "friction", "pressure_ratio")
-               if key in table}  # fmt: skip
+def _density(told: ProductFile, name: str) -> Density:
     return Density(
-        name,
-        _finite(f"{name}: density", table["density"]),
-        numbers.get("density_std", 0.0),
-        str(table.get("source", "")),
-        _curve(name, table.get("compaction", [])),
-        numbers.get("friction", 0.4),
-        numbers.get("pressure_ratio", 0.5),
+        told.name or name,
+        told.density,
+        told.density_std,
+        told.source,
+        told.compaction,
+        told.friction,
+        told.pressure_ratio,
     )
-
-
-def _curve(name: str, entries: Any) -> tuple[tuple[float, float], ...]:
-    if not isinstance(entries, list) or not all(isinstance(e, list) and len(e) == 2 for e in entries):
-        raise InputError(f"{name}: compaction must be a list of [pressure in Pa, density in kg/m³]")
-    return tuple((_finite(f"{name}: pressure", p), _finite(f"{name}: density", d)) for p, d in entries)
 
 
 def _number(density: float, std: float | None) -> Density:
@@ -186,9 +168,3 @@ def _with_std(chosen: Density, std: float) -> Density:
 def _between(what: str, value: float, least: float, most: float) -> None:
     if not (math.isfinite(value) and least <= value <= most):
         raise InputError(f"{what} must be between {least:g} and {most:g}, got {value}")
-
-
-def _finite(what: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise InputError(f"{what} must be a finite number, got {value!r}")
-    return float(value)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field, replace
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -61,7 +60,7 @@ def know(
     """
     if calibration.pose is None:
         raise InputError(f"the calibration has no answer ({calibration.reason}); calibrate with frames that show wall")
-    own = _profile(calibration)
+    own = sensors.from_record(calibration.config.get("sensor"))
     profile = sensor or own or sensors.UNKNOWN
     if sensor is not None and own is not None and sensor.bias != own.bias:
         raise UsageError(
@@ -142,24 +141,6 @@ def _cone_alone(calibration: Calibration, lengths: Lengths) -> Lengths:
         assumed=tuple(a for a in lengths.assumed if "filled" not in a) + said,
         cone_only=True,
     )
-
-
-def _profile(calibration: Calibration) -> SensorProfile | None:
-    """The sensor profile that the calibration was made with, as its ``config`` tells it."""
-    table: Any = calibration.config.get("sensor")
-    try:
-        bias, bias_std = (tuple(float(table[key][n]) for n in sensors.BIAS) for key in ("bias", "bias_std"))
-        noise = None if table["noise"] is None else tuple(float(table["noise"][name]) for name in sensors.NOISE)
-        name = str(table["name"])
-    except (TypeError, KeyError, ValueError):
-        return None
-    return SensorProfile(name, bias, bias_std, noise, _ranges().get(name, (0.0, math.inf)))  # type: ignore[arg-type]
-
-
-@cache
-def _ranges() -> dict[str, tuple[float, float]]:
-    """Ranges of the shipped profiles by their names; a calibration does not keep the range."""
-    return {profile.name: profile.range for profile in map(sensors.load, sensors.names())}
 
 
 def _bias(calibration: Calibration, profile: SensorProfile) -> tuple[float, float, float]:

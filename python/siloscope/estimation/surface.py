@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
+from siloscope.parameters import PARAMETERS
 from siloscope.reasons import estimate_refusals, sentence
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate, Ratios, SurfaceDetails
-from siloscope.types.frame_factor import PARAMETERS, FrameFactor
+from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry
 

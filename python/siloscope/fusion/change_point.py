@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.fusion.solve import BIAS, FAR, RADIUS, SCALE, Fused, Stack, deviation, fuse, majority, sums
-from siloscope.types.frame_factor import SIZE, SummedFactor
+from siloscope.parameters import SIZE
+from siloscope.types.frame_factor import SummedFactor
 from siloscope.types.move import Move
 
 SHORTEST = 3

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from siloscope import _core
 from siloscope.fusion.solve import BIAS, Stack, fuse, solved_by_frame
-from siloscope.types.frame_factor import SIZE, Matrix, SummedFactor, Vector
+from siloscope.parameters import SIZE
+from siloscope.types.frame_factor import Matrix, SummedFactor, Vector
 
 DEPTH_BIAS = slice(BIAS, BIAS + 3)
 

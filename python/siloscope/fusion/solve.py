@@ -14,7 +14,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.types.frame_factor import PARAMETERS, SIZE, FrameFactor, Matrix, SummedFactor, Vector
+from siloscope.parameters import PARAMETERS, SIZE
+from siloscope.types.frame_factor import FrameFactor, Matrix, SummedFactor, Vector
 
 RADIUS, SCALE, QUADRATIC = (PARAMETERS.index(name) for name in ("radius", "scale", "quadratic"))
 BIAS = PARAMETERS.index("offset")

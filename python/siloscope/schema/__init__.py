@@ -1,1 +1,6 @@
-"""Files that are written and read back, with the check of every field."""
+"""Files that are written and read back: a typed model each. Here the names and versions of the documents."""
+
+ESTIMATE = "siloscope.estimate/1"
+CALIBRATION = "siloscope.calibration/1"
+CONTENT = "siloscope.content/1"
+TRACK = "siloscope.track/1"

@@ -2,22 +2,28 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope.parameters import PARAMETERS
 from siloscope.reasons import FRAME_STATUSES
-from siloscope.types.frame_factor import PARAMETERS, FrameFactor, SummedFactor
+from siloscope.schema import CALIBRATION
+from siloscope.schema.files import write_whole
+from siloscope.types.frame_factor import FrameFactor, SummedFactor
 from siloscope.types.move import Move
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry
 
-SCHEMA = "siloscope.calibration/1"
+if TYPE_CHECKING:
+    from siloscope.schema.calibration import CalibrationDocument, Record
+    from siloscope.schema.calibration import Evidence as EvidenceDocument
 
 
 @dataclass(frozen=True)
@@ -61,6 +67,14 @@ class Evidence:
     """Frame number and what it says, in the order of the sequence."""
     earlier: SummedFactor | None = None
     """Frames before those, added up."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "names": list(PARAMETERS),
+            "frames": [{"index": number, **factor.to_dict()} for number, factor in self.frames],
+            "earlier": None if self.earlier is None else self.earlier.to_dict(),
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,13 +154,11 @@ class Calibration:
 
     def to_dict(self) -> dict[str, Any]:
         """The document of ``siloscope calibrate`` (schema ``siloscope.calibration/1``)."""
-        from siloscope.schema.calibration_file import evidence_to_dict
-
         names = ("r_x", "r_y", "t_x", "t_y")
         pose = self.pose
         std = None if self.covariance is None else np.sqrt(np.diag(self.covariance))
         return {
-            "schema": SCHEMA,
+            "schema": CALIBRATION,
             "status": self.status,
             "reason": self.reason,
             "message": self.message,
@@ -172,7 +184,7 @@ class Calibration:
             "frames": [record.to_dict() for record in self.frames],
             "config": self.config,
             "timing_ms": self.timing_ms,
-            "evidence": evidence_to_dict(self.evidence),
+            "evidence": self.evidence.to_dict(),
         }
 
     def _parameters(self) -> dict[str, Any] | None:
@@ -194,13 +206,52 @@ class Calibration:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the JSON document; raises `OSError` where that is not possible."""
-        from siloscope.schema.calibration_file import write
-
-        write(self, Path(path))
+        write_whole(Path(path), json.dumps(self.to_dict(), allow_nan=False, separators=(",", ":")) + "\n")
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Calibration:
         """Reads a calibration file; raises `InputError` that names the file, the entry and the remedy."""
-        from siloscope.schema.calibration_file import read
+        from siloscope.schema.calibration import read
 
-        return read(Path(path))
+        return _from_document(*read(Path(path)))
+
+
+def _from_document(told: CalibrationDocument, config: dict[str, Any]) -> Calibration:
+    ok = told.status == "ok"
+    parameters = told.parameters if ok else None
+    return Calibration(
+        told.status,
+        told.rule,
+        SiloPose(*told.pose) if ok and told.pose else None,
+        told.covariance if ok else None,
+        SiloGeometry(**_fields(SiloGeometry, told.silo)),
+        SiloGeometry(**_fields(SiloGeometry, told.silo.std)),
+        None if parameters is None else parameters.values,
+        None if parameters is None else parameters.covariance,
+        told.excess,
+        told.scale_std,
+        tuple(Move(**_fields(Move, move)) for move in told.moves),
+        tuple(_record(record) for record in told.frames),
+        tuple(told.quality),
+        told.reason,
+        told.message,
+        config,
+        told.timing_ms,
+        _evidence(told.evidence),
+        told.method,
+    )
+
+
+def _record(told: Record) -> FrameRecord:
+    return FrameRecord(**{**_fields(FrameRecord, told), "pose": SiloPose(*told.pose) if told.pose else None})
+
+
+def _evidence(told: EvidenceDocument) -> Evidence:
+    frames = tuple((frame.index, FrameFactor(**_fields(FrameFactor, frame))) for frame in told.frames)
+    earlier = told.earlier
+    return Evidence(frames, None if earlier is None else SummedFactor(**_fields(SummedFactor, earlier)))
+
+
+def _fields(kind: type[Any], told: Any) -> dict[str, Any]:
+    """A document's entries that are a type's fields."""
+    return {field.name: getattr(told, field.name) for field in fields(kind)}

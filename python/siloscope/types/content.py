@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from siloscope.reasons import CONTENT_REMARKS
+from siloscope.schema import CONTENT
 from siloscope.types.surface_map import Shape, SurfaceMap
 from siloscope.types.vessel import Lengths, to_plain
 
@@ -35,9 +36,6 @@ class Remark:
         """Plain data."""
         return {"code": self.code, "message": self.message, "advice": self.advice, "seen": self.seen,
                 "refuses": self.refuses}  # fmt: skip
-
-
-SCHEMA = "siloscope.content/1"
 
 
 DATUMS = ("cone-vertex", "lowest-seen")
@@ -160,7 +158,7 @@ class Content:
     def to_dict(self) -> dict[str, Any]:
         """The document of ``siloscope measure --json`` (schema ``siloscope.content/1``)."""
         return {
-            "schema": SCHEMA,
+            "schema": CONTENT,
             "status": self.status,
             "reason": self.reason,
             "message": self.message,

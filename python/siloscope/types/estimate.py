@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope.schema import ESTIMATE
 from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry
@@ -115,7 +116,7 @@ class Estimate:
         pose = self.pose
         std = None if self.covariance is None else np.sqrt(np.diag(self.covariance))
         return {
-            "schema": "siloscope.estimate/1",
+            "schema": ESTIMATE,
             "status": self.status,
             "reason": self.reason,
             "message": self.message,

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope.parameters import SIZE
+
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
-
-PARAMETERS = (
-    *("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "cone_intercept"),
-    *("offset", "scale", "quadratic", "oval_cos", "oval_sin"),
-)
-"""Order of the parameters: pose; radius; cone (its radius b − m·z: slope m, intercept b); depth bias; ovality."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +48,15 @@ class FrameFactor:
     """(K, 3): (x, y) of rays (x, y, 1) to some of the wall that was seen, and their information, 1/m². None where the
     depth bias is known: the equations hold far enough."""
 
-
-SIZE = len(PARAMETERS)
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data; of symmetric matrices only the upper triangle, row by row."""
+        return {
+            **{name: nullable(getattr(self, name)) for name in _VECTORS},
+            **{name: _triangle(getattr(self, name)) for name in _MATRICES},
+            "free": [bool(f) for f in self.free],
+            "rays": self.rays.tolist(),
+            "scale_std": self.scale_std,
+        }
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,3 +82,29 @@ class SummedFactor:
         """No frames."""
         zero, none = np.zeros((SIZE, SIZE)), np.zeros(SIZE)
         return cls(none, zero, none, zero, zero, 0.0, 0, none, none)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data; of symmetric matrices only the upper triangle, row by row."""
+        return {
+            **{name: getattr(self, name).tolist() for name in _SUM_VECTORS},
+            **{name: _triangle(getattr(self, name)) for name in _SUM_MATRICES},
+            "weight": self.weight,
+            "frames": self.frames,
+        }
+
+
+_UPPER = np.triu_indices(SIZE)
+_VECTORS = ("parameters", "gradient", "prior_mean", "prior_information", "base")
+_MATRICES = ("information", "scatter", "noise")
+_SUM_VECTORS = ("origin", "pull", "prior_information", "prior_mean")
+_SUM_MATRICES = ("information", "noise", "shared")
+
+
+def nullable(values: Vector) -> list[float | None]:
+    """A vector as plain data; None where it is not a number."""
+    return [float(v) if math.isfinite(v) else None for v in values]
+
+
+def _triangle(matrix: Matrix) -> list[float]:
+    upper: list[float] = matrix[_UPPER].tolist()
+    return upper

@@ -7,10 +7,8 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any
 
+from siloscope.schema import TRACK
 from siloscope.types.content import Content
-
-SCHEMA = "siloscope.track/1"
-
 
 DAY = 86_400.0
 """Seconds."""
@@ -152,7 +150,7 @@ class Track:
     def to_dict(self) -> dict[str, Any]:
         """The document of ``siloscope track --json`` (schema ``siloscope.track/1``)."""
         return {
-            "schema": SCHEMA,
+            "schema": TRACK,
             "status": "ok" if self.counts["ok"] else "refused",
             "reason": None if self.counts["ok"] else _commonest(self.readings),
             "counts": self.counts,

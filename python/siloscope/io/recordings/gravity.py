@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from siloscope.io.recordings.recording import Entry, Recording, Topic, or_none
 from siloscope.io.recordings.ros_messages import read_acceleration
+from siloscope.parameters import GRAVITY
 
-STANDARD_GRAVITY = 9.80665
 _TOLERANCE = 1.0
 """How far, in m/s², the mean may be from standard gravity: bias and scale of small accelerometers."""
 _SHAKE = 1.0
@@ -39,7 +39,7 @@ def at_rest(samples: NDArray[np.float64]) -> tuple[NDArray[np.float64] | None, s
         return None, "the accelerometer's stream is empty"
     mean = samples.mean(axis=0)
     size = float(np.linalg.norm(mean))
-    if abs(size - STANDARD_GRAVITY) > _TOLERANCE:
+    if abs(size - GRAVITY) > _TOLERANCE:
         return None, f"the accelerometer's mean is {size:.2f} m/s², not gravity"
     if float(np.sqrt(samples.var(axis=0).sum())) > _SHAKE:
         return None, "the camera was moved while recording"

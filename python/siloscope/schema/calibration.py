@@ -1,0 +1,278 @@
+"""Calibration files: JSON of the schema ``siloscope.calibration/1``, read strictly."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, model_validator
+
+from siloscope.errors import InputError
+from siloscope.parameters import PARAMETERS, POSE, SIZE
+from siloscope.reasons import CALIBRATION_REMARKS, FRAME_STATUSES
+from siloscope.schema import CALIBRATION, files
+from siloscope.schema.fields import (
+    Array,
+    Index,
+    NotNegative,
+    Number,
+    at_least,
+    finite,
+    symmetric,
+    triangle,
+    vector,
+)
+from siloscope.schema.sensor_profile import SensorRecord
+from siloscope.schema.validation import Document, validated, wrong
+
+LARGEST_FILE = 50_000_000
+"""Bytes; 300 frames of factors take about 2 MB."""
+
+MOST_RAYS = 1000
+"""No frame keeps as many."""
+
+REMEDY = "take the file as `siloscope calibrate` wrote it, or calibrate again"
+
+NAMES = f"must be {', '.join(PARAMETERS)}, as this version of siloscope has them"
+
+Vector = Annotated[Array, vector(SIZE)]
+Nullable = Annotated[Array, vector(SIZE, nullable=True)]
+Triangle = Annotated[Array, triangle(SIZE)]
+
+
+def _rays(value: Any) -> Array:
+    rows = value if isinstance(value, list) else [()]
+    if len(rows) > MOST_RAYS or not all(isinstance(row, list) and len(row) == 3 for row in rows):
+        raise wrong(f"must be at most {MOST_RAYS} times 3 numbers")
+    rays = np.array([[finite(v) for v in row] for row in rows]).reshape(-1, 3)
+    if (rays[:, 2] < 0.0).any():
+        raise wrong("has information below zero")
+    return rays
+
+
+def _flags(value: Any) -> Any:
+    if not isinstance(value, list) or len(value) != SIZE or not all(isinstance(f, bool) for f in value):
+        raise wrong(f"must be {SIZE} times true or false")
+    return np.array(value)
+
+
+def _code(value: Any) -> str:
+    if value not in CALIBRATION_REMARKS:
+        raise wrong(f"is the unknown code {value!r}")
+    return str(value)
+
+
+def _status(value: str) -> str:
+    if value not in FRAME_STATUSES:
+        raise wrong(f"is {value!r}; known are {', '.join(FRAME_STATUSES)}")
+    return value
+
+
+def _diameter(value: float) -> float:
+    if not 0.01 <= value <= 200.0:
+        raise wrong("must be between 0.01 and 200 m")
+    return value
+
+
+class Pose(Document):
+    """Of a record or the whole; all four or none."""
+
+    r_x: Number | None = None
+    r_y: Number | None = None
+    t_x: Number | None = None
+    t_y: Number | None = None
+
+    @property
+    def pose(self) -> tuple[float, ...] | None:
+        """The four, or None."""
+        known = tuple(value for value in (self.r_x, self.r_y, self.t_x, self.t_y) if value is not None)
+        return known if len(known) == len(POSE) else None
+
+    def require_pose(self) -> None:
+        """Raises where one of the four is missing."""
+        lacking = next((name for name in POSE if getattr(self, name) is None), None)
+        if lacking is not None:
+            raise wrong("must be a finite number, not 'None'", lacking)
+
+
+class Lengths(Document):
+    """The silo's; null where not seen."""
+
+    radius: Number | None = None
+    cylinder_bottom: Number | None = None
+    apex: Number | None = None
+
+
+class Deviations(Document):
+    """Standard deviations of the silo's lengths."""
+
+    radius: NotNegative | None = None
+    cylinder_bottom: NotNegative | None = None
+    apex: NotNegative | None = None
+
+
+class Silo(Lengths):
+    """``silo``."""
+
+    std: Deviations
+
+    @model_validator(mode="after")
+    def _possible(self) -> Silo:
+        if self.radius is not None and self.radius <= 0.0:
+            raise wrong(f"must be above 0, not {self.radius:g}", "radius")
+        if self.cylinder_bottom is not None and self.apex is not None and self.apex < self.cylinder_bottom:
+            raise wrong(f"must lie below the cylinder's bottom, not at {self.apex:g}", "apex")
+        return self
+
+
+class Parameters(Document):
+    """``parameters``."""
+
+    names: Any = None
+    values: Nullable
+    covariance: Annotated[Array, symmetric(SIZE)]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, content: Any) -> Any:
+        return _with_names(content)
+
+
+class Move(Document):
+    """A move of the camera."""
+
+    index: Index
+    turn: NotNegative
+    shift: NotNegative
+    significance: NotNegative
+
+
+class Record(Pose):
+    """What became of one frame."""
+
+    index: Index
+    name: str
+    status: Annotated[str, AfterValidator(_status)]
+    weight: NotNegative
+    deviation: Number | None = None
+    timestamp: Number | None = None
+    reason: str | None = None
+
+    @model_validator(mode="after")
+    def _whole(self) -> Record:
+        if self.r_x is not None:
+            self.require_pose()
+        return self
+
+
+class Factor(Document):
+    """What one frame says about all parameters."""
+
+    index: Index
+    parameters: Nullable
+    information: Triangle
+    gradient: Vector
+    scatter: Triangle
+    noise: Triangle
+    free: Annotated[Any, PlainValidator(_flags)]
+    prior_mean: Nullable
+    prior_information: Nullable
+    scale_std: NotNegative
+    base: Nullable
+    rays: Annotated[Array, PlainValidator(_rays)]
+
+    @model_validator(mode="after")
+    def _estimated(self) -> Factor:
+        for name in ("parameters", "base"):
+            if not np.isfinite(getattr(self, name)[self.free]).all():
+                raise wrong("lacks a value that was estimated", name)
+        return self
+
+
+class Summed(Document):
+    """Factors of earlier frames added up."""
+
+    origin: Vector
+    information: Triangle
+    pull: Vector
+    noise: Triangle
+    shared: Triangle
+    weight: NotNegative
+    frames: Index
+    prior_information: Vector
+    prior_mean: Vector
+
+
+class Evidence(Document):
+    """``evidence``: what the calibration rests on."""
+
+    names: Any = None
+    frames: list[Factor]
+    earlier: Summed | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, content: Any) -> Any:
+        holds = isinstance(content, dict) and (content.get("frames") or content.get("earlier"))
+        return _with_names(content) if holds else content
+
+
+class Config(Document):
+    """The settings that a calibration is continued with; the rest of ``config`` is kept as it is."""
+
+    diameter: Annotated[float, BeforeValidator(finite), AfterValidator(_diameter)] | None = None
+    gravity: Annotated[Array, vector(3)] | None = None
+    sensor: SensorRecord | None = None
+
+
+class CalibrationDocument(Pose):
+    """The whole file."""
+
+    status: Literal["ok", "refused"]
+    rule: str
+    method: str
+    covariance: Annotated[Array, symmetric(4)] | None = None
+    silo: Silo
+    parameters: Parameters | None = None
+    excess: Annotated[float, BeforeValidator(finite), AfterValidator(at_least(1.0))]
+    scale_std: NotNegative
+    moves: list[Move]
+    frames: list[Record]
+    quality: list[Annotated[str, PlainValidator(_code)]]
+    reason: str | None = None
+    message: str | None = None
+    checked: Config = Field(alias="config")
+    timing_ms: dict[str, Number]
+    evidence: Evidence
+
+    @model_validator(mode="after")
+    def _answered(self) -> CalibrationDocument:
+        """An answer has a pose and its covariance; one frame averaged by the paper's rule has no covariance."""
+        if self.status == "ok":
+            self.require_pose()
+            if self.covariance is None and self.rule != "mean-of-last-10":
+                raise wrong("must be 4 rows of 4 numbers", "covariance")
+        return self
+
+
+def _with_names(content: Any) -> Any:
+    if isinstance(content, dict) and content.get("names") != list(PARAMETERS):
+        raise wrong(NAMES, "names")
+    return content
+
+
+def read(path: Path) -> tuple[CalibrationDocument, dict[str, Any]]:
+    """The document of a calibration file, checked, and its ``config`` as it stands.
+
+    Raises
+    ------
+    InputError
+        Where the file can't be read, is no calibration, or an entry is missing or can't be right.
+    """
+    content = files.from_json(files.content(path, LARGEST_FILE, "a calibration", REMEDY), str(path), REMEDY)
+    schema = content.get("schema") if isinstance(content, dict) else None
+    if schema != CALIBRATION:
+        found = f"its schema is {schema!r}" if schema else "it names no schema"
+        raise InputError(f"{path}: no calibration of the schema {CALIBRATION} ({found}); {REMEDY}")
+    return validated(CalibrationDocument, content, str(path), REMEDY), content["config"]
