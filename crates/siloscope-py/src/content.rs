@@ -12,12 +12,13 @@ use siloscope::content::cloud::Relief;
 use siloscope::content::doubt::Covariance;
 use siloscope::content::fit::Surface;
 use siloscope::content::measure::{Content, Setup, bare_reach, measure, shape_of};
-use siloscope::content::returns::{Rays, Source};
+use siloscope::content::returns::Source;
 use siloscope::content::shape::{Form, Shape};
 use siloscope::content::volume::Kind;
+use siloscope::geometry::depth_image::DepthImage;
 use siloscope::geometry::sensor::{DepthBias, NoiseLaw};
 use siloscope::geometry::vessel::Vessel;
-use siloscope::{Camera, SiloPose, Vec3};
+use siloscope::{SiloPose, Vec3};
 
 /// A silo as Python gives it: radius, cylinder_bottom, apex, top, outlet radius and length, ovality c and s.
 fn vessel([radius, cylinder_bottom, apex, top, outlet_radius, outlet_length, c, s]: [f64; 8]) -> Vessel {
@@ -114,23 +115,13 @@ fn with_source<'py, T: Send>(
             let expected = (camera.height, camera.width);
             return Err(value_error(format!("the depth has shape {shape:?}, its camera {expected:?}")));
         }
-        Some(camera) => py.detach(|| with_rays(numbers, camera, rays, &run)),
+        Some(camera) => {
+            let rays = rays.map(|rays| rays.as_chunks::<2>().0);
+            let image = DepthImage::new(numbers, camera, rays).map_err(value_error)?;
+            py.detach(|| run(Source::Depth(image)))
+        }
     };
     found.map_err(value_error)
-}
-
-fn with_rays<T>(
-    depth: &[f32],
-    camera: &Camera,
-    rays: Option<&[f64]>,
-    run: &impl Fn(Source<'_>) -> siloscope::Result<T>,
-) -> siloscope::Result<T> {
-    if let Some(rays) = rays {
-        return run(Source::Depth(depth, Rays::Each(rays.as_chunks::<2>().0, camera.width)));
-    }
-    let columns: Vec<f32> = (0..camera.width).map(|u| camera.ray(u as f64, camera.cy)[0] as f32).collect();
-    let rows: Vec<f32> = (0..camera.height).map(|v| camera.ray(camera.cx, v as f64)[1] as f32).collect();
-    run(Source::Depth(depth, Rays::Pinhole(&columns, &rows)))
 }
 
 fn matrix(covariance: &PyReadonlyArray2<'_, f64>) -> PyResult<Covariance> {

@@ -6,16 +6,16 @@ use numpy::{
 };
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
-use siloscope::Vec3;
 use siloscope::base::workers::Workers;
-use siloscope::geometry::backproject::{DepthImage, Depths};
-use siloscope::geometry::{backproject, normals};
+use siloscope::geometry::depth_image::{self, Depth, DepthImage};
+use siloscope::geometry::normals;
 use siloscope::shape_tensor::axis::{self, Wall};
 use siloscope::shape_tensor::candidates::{self, Candidate, View};
 use siloscope::shape_tensor::tensors::ShapeTensor;
 use siloscope::shape_tensor::{self, Outcome};
 use siloscope::stats::neighbours::Neighbours;
 use siloscope::stats::{neighbours, voxel_grid as grid};
+use siloscope::{Camera, Vec3};
 
 type Doubles<'py> = PyReadonlyArray2<'py, f64>;
 type Vectors<'py> = Bound<'py, PyArray2<f64>>;
@@ -30,13 +30,19 @@ enum DepthArray<'py> {
     Raw(PyReadonlyArray2<'py, u16>),
 }
 
-impl DepthArray<'_> {
-    fn depths(&self) -> PyResult<Depths<'_>> {
-        Ok(match self {
-            Self::Single(depth) => Depths::Single(entries(depth)?),
-            Self::Double(depth) => Depths::Double(entries(depth)?),
-            Self::Raw(depth) => Depths::Raw(entries(depth)?),
-        })
+/// A depth image as a Python caller describes it.
+struct Described<'a> {
+    camera: Camera,
+    rays: Option<&'a [[f64; 2]]>,
+    unit: f64,
+    mask: Option<&'a [bool]>,
+}
+
+impl Described<'_> {
+    fn image<'a, T: Element + Depth>(&'a self, depth: &'a PyReadonlyArray2<T>) -> PyResult<DepthImage<'a, T>> {
+        let image = DepthImage::new(entries(depth)?, &self.camera, self.rays);
+        let image = image.and_then(|image| image.with_unit(self.unit)).map_err(value_error)?;
+        self.mask.map_or(Ok(image), |mask| image.with_mask(mask)).map_err(value_error)
     }
 }
 
@@ -94,13 +100,20 @@ fn back_project<'py>(
     unit: f64,
     mask: Option<PyReadonlyArray2<'py, bool>>,
 ) -> PyResult<(Indices<'py>, Vectors<'py>)> {
-    let camera = self::camera(camera)?;
     let rays = rays.as_ref().map(rays_of).transpose()?;
     let mask = mask.as_ref().map(entries).transpose()?;
-    let image = DepthImage::new(depth.depths()?, &camera, rays, unit, mask).map_err(value_error)?;
-    let (pixels, points) = py.detach(|| backproject::back_project(&image));
+    let described = Described { camera: self::camera(camera)?, rays, unit, mask };
+    let (pixels, points) = match &depth {
+        DepthArray::Single(depth) => back_projected(py, &described.image(depth)?),
+        DepthArray::Double(depth) => back_projected(py, &described.image(depth)?),
+        DepthArray::Raw(depth) => back_projected(py, &described.image(depth)?),
+    };
     let pixels: Vec<u32> = pixels.into_iter().map(|pixel| pixel as u32).collect();
     Ok((pixels.into_pyarray(py), to_array(py, &points)?))
+}
+
+fn back_projected<T: Depth>(py: Python<'_>, image: &DepthImage<T>) -> (Vec<usize>, Vec<Vec3>) {
+    py.detach(|| depth_image::back_project(image))
 }
 
 fn rays_of<'a>(rays: &'a Doubles) -> PyResult<&'a [[f64; 2]]> {
@@ -119,7 +132,7 @@ fn voxel_grid<'py>(
     threads: usize,
 ) -> PyResult<(Vectors<'py>, Indices<'py>)> {
     let points = vectors(&points)?;
-    let cloud = py.detach(|| grid::voxel_grid(&points, size, &Workers::new(threads))).map_err(value_error)?;
+    let cloud = py.detach(|| grid::voxel_grid(points.as_slice(), size, &Workers::new(threads))).map_err(value_error)?;
     Ok((to_array(py, &cloud.points)?, cloud.counts.into_pyarray(py)))
 }
 
@@ -255,11 +268,23 @@ fn shape_tensor_image<'py>(
     mask: Option<PyReadonlyArray2<'py, bool>>,
     settings: Settings,
 ) -> PyResult<Bound<'py, PyDict>> {
-    let (camera, settings) = (self::camera(camera)?, self::settings(settings)?);
+    let settings = self::settings(settings)?;
     let rays = rays.as_ref().map(rays_of).transpose()?;
     let mask = mask.as_ref().map(entries).transpose()?;
-    let image = DepthImage::new(depth.depths()?, &camera, rays, unit, mask).map_err(value_error)?;
-    outcome(py, py.detach(|| shape_tensor::locate_in_image(&image, &settings)).map_err(value_error)?)
+    let described = Described { camera: self::camera(camera)?, rays, unit, mask };
+    match &depth {
+        DepthArray::Single(depth) => located(py, &described.image(depth)?, &settings),
+        DepthArray::Double(depth) => located(py, &described.image(depth)?, &settings),
+        DepthArray::Raw(depth) => located(py, &described.image(depth)?, &settings),
+    }
+}
+
+fn located<'py, T: Depth>(
+    py: Python<'py>,
+    image: &DepthImage<T>,
+    settings: &shape_tensor::Settings,
+) -> PyResult<Bound<'py, PyDict>> {
+    outcome(py, py.detach(|| shape_tensor::locate_in_image(image, settings)).map_err(value_error)?)
 }
 
 /// Runs the six steps on points (N, 3), metres, seen from the origin; rows that aren't finite are left out.

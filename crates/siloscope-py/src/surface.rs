@@ -8,11 +8,11 @@ use siloscope::base::refusal::Refusal;
 use siloscope::base::workers::Workers;
 use siloscope::fusion::frame_factor::FrameShare;
 use siloscope::fusion::relinearize::{Ray, seen_from};
+use siloscope::geometry::depth_image::DepthImage;
 use siloscope::geometry::parameters::{Information, PARAMETERS, Parameters};
 use siloscope::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
 use siloscope::geometry::surface::{Cone, SiloSurface};
 use siloscope::surface_fit::segmentation::{coverage, label_pixels};
-use siloscope::surface_fit::tiles::DepthImage;
 use siloscope::surface_fit::warm_start::KnownWall;
 use siloscope::surface_fit::{Knowledge, Outcome, SurfaceFit, fit_cloud, fit_image};
 use siloscope::{SiloPose, Vec3};
@@ -86,7 +86,7 @@ fn surface_fit_image<'py>(
         radius,
         gravity: gravity.map(|(x, y, z, std)| (Vec3::new(x, y, z), std)),
     };
-    let image = DepthImage { width, height, rays, depth };
+    let image = DepthImage::with_rays(depth, rays, width, height).map_err(value_error)?;
     let wall = wall.map(known_wall);
     let found = py.detach(|| {
         let found = fit_image(&image, &know, wall.as_ref());

@@ -51,7 +51,7 @@ impl Relief {
         let centred = Grid { centre: [0.0, 0.0], ..grid };
         let noise = NoiseLaw::uniform(noise);
         let pose = SiloPose::default();
-        let returns = Returns::new(Source::Points(&down), DepthBias::default(), &pose, [0.0; 2])?;
+        let returns = Returns::new(Source::Points(&down), DepthBias::default(), &pose, [0.0; 2]);
         let bound = Bound::new(10.0 * extent.reach, [0.0; 2], &noise, 0.0, f64::MIN, [0.0; 2]);
         let (mut cells, _) = gather(&returns, &bound, &centred, &noise, &Lever::new(&pose, DepthBias::default()));
         for cell in cells.iter_mut().filter(|c| c.seen()) {

@@ -51,10 +51,11 @@ fn density(cell: &Cell, beside: Option<&Cell>, whole: Option<&bool>) -> f64 {
 #[allow(clippy::panic)]
 mod tests {
     use super::*;
-    use crate::SiloPose;
     use crate::content::cells::gather;
-    use crate::content::returns::{Rays, Returns, Source};
+    use crate::content::returns::{Returns, Source};
+    use crate::geometry::depth_image::DepthImage;
     use crate::geometry::sensor::DepthBias;
+    use crate::{Camera, Distortion, SiloPose};
 
     const SIGMA: f64 = 0.05;
 
@@ -70,16 +71,14 @@ mod tests {
     /// Slope of the plane through the cells, which is 0.5 in truth, with and without the correction. The camera looks to
     /// one side, so that noise moves the far returns outwards.
     fn slopes(seed: u64) -> [f64; 2] {
-        let columns: Vec<f32> = (0..320).map(|u| u as f32 / 570.0).collect();
-        let rows: Vec<f32> = (0..240).map(|v| (v as f32 - 119.5) / 285.0).collect();
+        let distortion = Distortion::None;
+        let camera = Camera { width: 320, height: 240, fx: 570.0, fy: 285.0, cx: 0.0, cy: 119.5, distortion };
         let mut state = seed;
-        let depth: Vec<f32> = (rows.iter())
-            .flat_map(|_| columns.iter())
-            .map(|&u| (3.0 / (1.0 - 0.5 * f64::from(u)) + SIGMA * normal(&mut state)) as f32)
-            .collect();
+        let depth: Vec<f32> =
+            (camera.rays().iter()).map(|[x, _]| (3.0 / (1.0 - 0.5 * x) + SIGMA * normal(&mut state)) as f32).collect();
         let (pose, noise) = (SiloPose::default(), NoiseLaw::uniform(SIGMA));
-        let source = Source::Depth(&depth, Rays::Pinhole(&columns, &rows));
-        let Ok(returns) = Returns::new(source, DepthBias::default(), &pose, [0.0; 2]) else { panic!("a frame") };
+        let Ok(image) = DepthImage::new(&depth, &camera, None) else { panic!("a frame") };
+        let returns = Returns::new(Source::Depth(image), DepthBias::default(), &pose, [0.0; 2]);
         let grid = Grid { centre: [0.0; 2], reach: 3.0, side: 32 };
         let bound = Bound::new(6.0, [0.0; 2], &noise, 10.0, 0.0, [0.0; 2]);
         let lever = Lever::new(&pose, DepthBias::default());

@@ -148,7 +148,7 @@ struct Seen<'a> {
 impl<'a> Seen<'a> {
     fn new(source: Source<'a>, setup: &Setup) -> Result<Self> {
         setup.vessel.validate()?;
-        let returns = Returns::new(source, setup.bias, &setup.pose, setup.vessel.ovality)?;
+        let returns = Returns::new(source, setup.bias, &setup.pose, setup.vessel.ovality);
         let grid = Grid::over_disc([0.0, 0.0], setup.vessel.radius, returns.len());
         let lever = Lever::new(&setup.pose, setup.bias);
         let bound = bound(setup);

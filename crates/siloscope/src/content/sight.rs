@@ -1,6 +1,9 @@
 //! How much of the silo the sensor sees at all.
 
-use super::returns::{Rays, Returns, Source};
+use super::returns::{Returns, Source};
+use crate::geometry::depth_image::DepthImage;
+use crate::geometry::evaluator::SurfaceEvaluator;
+use crate::geometry::surface::Part;
 use crate::geometry::vessel::Vessel;
 use crate::{SiloPose, Vec3};
 
@@ -34,43 +37,31 @@ pub fn sight(source: Source<'_>, returns: &Returns<'_>, vessel: &Vessel, pose: &
     });
     Sight {
         measured: measured / f64::max(all, 1.0),
-        blind: if let Source::Depth(depth, rays) = source { blind(depth, rays, vessel, pose, range) } else { 0.0 },
+        blind: if let Source::Depth(image) = source { blind(&image, vessel, pose, range) } else { 0.0 },
         near: near / f64::max(measured, 1.0),
     }
 }
 
-fn blind(depth: &[f32], rays: Rays<'_>, vessel: &Vessel, pose: &SiloPose, range: [f64; 2]) -> f64 {
-    let columns = match rays {
-        Rays::Pinhole(columns, _) => columns.len(),
-        Rays::Each(_, columns) => columns,
-    };
-    let rows = depth.len() / columns.max(1);
+fn blind(image: &DepthImage, vessel: &Vessel, pose: &SiloPose, range: [f64; 2]) -> f64 {
+    let wall = EmptyVessel::new(vessel, pose);
     let (mut expected, mut blind) = (0.0, 0.0);
     for tile in 0..TILES[0] * TILES[1] {
         let (u, v) = (tile % TILES[0], tile / TILES[0]);
         let span = |i: usize, tiles: usize, size: usize| (i * size / tiles, (i + 1) * size / tiles);
-        let ((u0, u1), (v0, v1)) = (span(u, TILES[0], columns), span(v, TILES[1], rows));
-        let Some(ray) = ray(rays, (u0 + u1) / 2, (v0 + v1) / 2) else { continue };
-        let there = wall_depth(vessel, pose, ray).is_some_and(|d| (range[0]..range[1]).contains(&d));
-        if there {
+        let ((u0, u1), (v0, v1)) = (span(u, TILES[0], image.width), span(v, TILES[1], image.height));
+        let ray = image.ray((v0 + v1) / 2 * image.width + (u0 + u1) / 2);
+        if wall.depth(ray).is_some_and(|d| (range[0]..range[1]).contains(&d)) {
             expected += 1.0;
-            blind += f64::from(u8::from(share(depth, columns, [u0, u1], [v0, v1]) < BLIND));
+            blind += f64::from(u8::from(measured_fraction(image, [u0, u1], [v0, v1]) < BLIND));
         }
     }
     if expected > 0.0 { blind / expected } else { 0.0 }
 }
 
-fn ray(rays: Rays<'_>, u: usize, v: usize) -> Option<[f64; 2]> {
-    match rays {
-        Rays::Pinhole(columns, rows) => Some([f64::from(*columns.get(u)?), f64::from(*rows.get(v)?)]),
-        Rays::Each(rays, columns) => rays.get(v * columns + u).copied(),
-    }
-}
-
-fn share(depth: &[f32], columns: usize, [u0, u1]: [usize; 2], [v0, v1]: [usize; 2]) -> f64 {
+fn measured_fraction(image: &DepthImage, [u0, u1]: [usize; 2], [v0, v1]: [usize; 2]) -> f64 {
     let (mut all, mut measured) = (0.0, 0.0);
     for v in (v0..v1).step_by(STRIDE) {
-        let line = depth.get(v * columns + u0..v * columns + u1).unwrap_or(&[]);
+        let line = image.depth.get(v * image.width + u0..v * image.width + u1).unwrap_or(&[]);
         for &d in line.iter().step_by(STRIDE) {
             all += 1.0;
             measured += f64::from(u8::from(d > 0.0));
@@ -79,37 +70,32 @@ fn share(depth: &[f32], columns: usize, [u0, u1]: [usize; 2], [v0, v1]: [usize; 
     if all > 0.0 { measured / all } else { 0.0 }
 }
 
-/// Depth at which a pixel's ray meets the empty silo; None where it leaves through the top.
-pub fn wall_depth(vessel: &Vessel, pose: &SiloPose, ray: [f64; 2]) -> Option<f64> {
-    let (p, q) = (Vec3::new(pose.t_x, pose.t_y, 0.0), pose.rotation() * Vec3::new(ray[0], ray[1], 1.0));
-    let (a, b) = (q.x * q.x + q.y * q.y, p.x * q.x + p.y * q.y);
-    let c = p.x * p.x + p.y * p.y;
-    let leaving = |a: f64, b: f64, c: f64| {
-        let root = (b * b - a * c).max(0.0).sqrt();
-        let out = if a.abs() > 1e-12 { (-b + root) / a } else { -c / (2.0 * b) };
-        (out > 0.0 && out.is_finite()).then_some(out)
-    };
-    let cylinder = if a > 1e-12 { leaving(a, b, c - vessel.radius * vessel.radius) } else { None };
-    if let Some(t) = cylinder.filter(|t| t * q.z <= vessel.cylinder_bottom) {
-        return (t * q.z >= vessel.top).then_some(t);
+/// The empty vessel as a camera sees it.
+struct EmptyVessel<'a> {
+    vessel: &'a Vessel,
+    wall: SurfaceEvaluator,
+}
+
+impl<'a> EmptyVessel<'a> {
+    fn new(vessel: &'a Vessel, pose: &SiloPose) -> Self {
+        Self { vessel, wall: SurfaceEvaluator::new(vessel.surface(pose)) }
     }
-    // the cone: r = m (apex - z), entered from above, so the nearest crossing below the cylinder counts
-    let height = vessel.cone_height();
-    if height <= 1e-9 {
-        return (q.z > 0.0).then(|| vessel.apex / q.z);
+
+    /// Depth at which a ray meets the wall or the floor; None where it leaves through the top.
+    fn depth(&self, ray: [f64; 2]) -> Option<f64> {
+        let q = Vec3::new(ray[0], ray[1], 1.0);
+        let (down, (wall, part)) = (self.wall.down(ray), self.wall.depth(&q));
+        let floor = self.vessel.cylinder_bottom / down;
+        let on_floor = part == Part::Cylinder && down > 0.0 && (wall > floor || wall.is_nan());
+        let depth = if on_floor { floor } else { wall };
+        (depth > 0.0 && depth.is_finite() && depth * down >= self.vessel.top).then_some(depth)
     }
-    let m = vessel.radius / height;
-    let square = (a - m * m * q.z * q.z, b + m * m * vessel.apex * q.z, c - m * m * vessel.apex * vessel.apex);
-    let root = (square.1 * square.1 - square.0 * square.2).max(0.0).sqrt();
-    let crossings = [(-square.1 + root) / square.0, (-square.1 - root) / square.0, -square.2 / (2.0 * square.1)];
-    let below =
-        |t: f64| t.is_finite() && t > 0.0 && (vessel.cylinder_bottom - 1e-9..=vessel.apex + 1e-9).contains(&(t * q.z));
-    crossings.into_iter().filter(|&t| below(t)).min_by(f64::total_cmp)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::{Camera, Distortion};
     use proptest::prelude::*;
 
     const VESSEL: Vessel = Vessel {
@@ -126,7 +112,7 @@ mod tests {
     proptest! {
         #[test]
         fn the_wall_is_where_the_ray_meets_it(x in -0.5f64..0.5, y in -0.4f64..0.4) {
-            let depth = wall_depth(&VESSEL, &POSE, [x, y]);
+            let depth = EmptyVessel::new(&VESSEL, &POSE).depth([x, y]);
             prop_assert!(depth.is_some());
             let p = POSE.to_silo(&(Vec3::new(x, y, 1.0) * depth.unwrap_or(f64::NAN)));
             let r = p.x.hypot(p.y);
@@ -138,14 +124,15 @@ mod tests {
 
     #[test]
     fn a_dark_corner_is_blind_and_a_whole_frame_is_not() {
-        let columns: Vec<f32> = (0..64).map(|u| (u as f32 - 31.5) / 80.0).collect();
-        let rows: Vec<f32> = (0..48).map(|v| (v as f32 - 23.5) / 80.0).collect();
-        let rays = Rays::Pinhole(&columns, &rows);
-        let look = |depth: &[f32]| blind(depth, rays, &VESSEL, &POSE, [0.2, 8.0]);
+        let distortion = Distortion::None;
+        let camera = Camera { width: 64, height: 48, fx: 80.0, fy: 80.0, cx: 31.5, cy: 23.5, distortion };
+        let look = |depth: &[f32]| {
+            DepthImage::new(depth, &camera, None).map(|image| blind(&image, &VESSEL, &POSE, [0.2, 8.0]))
+        };
         let mut depth = vec![2.0f32; 64 * 48];
-        assert_eq!(look(&depth), 0.0);
+        assert_eq!(look(&depth), Ok(0.0));
         depth.chunks_exact_mut(64).for_each(|row| row[..32].fill(0.0));
-        assert!((look(&depth) - 0.5).abs() < 0.1);
-        assert_eq!(look(&[0.0; 64 * 48]), 1.0);
+        assert!(look(&depth).is_ok_and(|blind| (blind - 0.5).abs() < 0.1));
+        assert_eq!(look(&[0.0; 64 * 48]), Ok(1.0));
     }
 }

@@ -1,7 +1,7 @@
 //! What a silo, a camera and its sensor are.
 
-pub mod backproject;
 pub mod camera;
+pub mod depth_image;
 pub mod evaluator;
 pub mod label;
 pub mod normals;

@@ -1,6 +1,7 @@
 //! The inside of a silo that holds feed: a cylinder on a cone, perhaps with an outlet pipe below the cone.
 
-use crate::{Error, Result};
+use crate::geometry::surface::{Cone, SiloSurface};
+use crate::{Error, Result, SiloPose};
 use std::f64::consts::PI;
 
 /// A silo's inside in the silo frame (z down, 0 at the camera's height). Metres.
@@ -61,6 +62,13 @@ impl Vessel {
     /// Area of the oval cross-section over that of the circle of the mean radius: the mean of the factor's square.
     pub fn stretch(&self) -> f64 {
         1.0 + 0.5 * (self.ovality[0] * self.ovality[0] + self.ovality[1] * self.ovality[1])
+    }
+
+    /// The round wall about a camera; without a cone where the floor is flat.
+    pub fn surface(&self, pose: &SiloPose) -> SiloSurface {
+        let height = self.cone_height();
+        let cone = (height > 1e-9).then(|| Cone { slope: self.radius / height, apex: self.apex });
+        SiloSurface { pose: *pose, radius: Some(self.radius), cone, ovality: [0.0; 2] }
     }
 
     /// Height of the cone.

@@ -11,7 +11,7 @@ pub mod tensors;
 use crate::base::clock::Clock;
 use crate::base::refusal::Refusal;
 use crate::base::workers::Workers;
-use crate::geometry::backproject::DepthImage;
+use crate::geometry::depth_image::{Depth, DepthImage};
 use crate::geometry::normals::normals;
 use crate::shape_tensor::axis::{AxisPoint, Consensus, Wall, axis_point, axis_points, consistent_direction};
 use crate::shape_tensor::candidates::{Candidate, View, select_candidates};
@@ -22,7 +22,7 @@ use crate::shape_tensor::profile::{Profile, fit_profile};
 use crate::shape_tensor::tensors::{ShapeTensor, shape_tensors};
 use crate::stats::blocks::blocks;
 use crate::stats::neighbours::{Neighbours, nearest_neighbours};
-use crate::stats::voxel_grid::{Cloud, voxel_grid, voxel_grid_of_image};
+use crate::stats::voxel_grid::{Cloud, voxel_grid};
 use crate::{Result, SiloPose, Vec3};
 use nalgebra::Matrix4;
 
@@ -72,9 +72,9 @@ pub struct Located {
 pub type Outcome = std::result::Result<Located, Refusal>;
 
 /// Finds the axis in a depth image.
-pub fn locate_in_image(image: &DepthImage, settings: &Settings) -> Result<Outcome> {
+pub fn locate_in_image<T: Depth>(image: &DepthImage<T>, settings: &Settings) -> Result<Outcome> {
     let (workers, mut clock) = (Workers::new(settings.threads), Clock::start());
-    let cloud = voxel_grid_of_image(image, settings.grid, &workers)?; // step 1, Eqs. 1 and 2
+    let cloud = voxel_grid(image, settings.grid, &workers)?; // step 1, Eqs. 1 and 2
     clock.lap("points");
     locate_in_grid(cloud, &[View::Inside, View::Outside], settings, &workers, clock)
 }

@@ -1,10 +1,10 @@
 //! Step 1, second half: one point a voxel.
 
 use crate::base::workers::Workers;
-use crate::geometry::backproject::DepthImage;
 use crate::{Error, Result, Vec3};
 use std::collections::HashMap;
 use std::hash::{BuildHasherDefault, Hasher};
+use std::ops::Range;
 
 /// Voxels counted from the origin to either side along each axis: 50 km at the default size.
 pub const REACH: f64 = 1_048_575.0;
@@ -28,32 +28,35 @@ pub struct Cloud {
     pub counts: Vec<u32>,
 }
 
-/// Means of `points` over voxels with side `size`. Points that aren't finite or lie beyond `REACH` voxels are left out.
-pub fn voxel_grid(points: &[Vec3], size: f64, workers: &Workers) -> Result<Cloud> {
-    check_size(size)?;
-    let sums = in_parts(
-        points.len(),
-        workers,
-        |range, grid: &mut Grid| {
-            points.get(range).unwrap_or_default().iter().for_each(|point| grid.add(point));
-        },
-        size,
-    );
-    Ok(sums.means())
+/// Where points come from, in parts that can be visited side by side.
+pub trait PointSource: Sync {
+    /// Number of parts.
+    fn parts(&self) -> usize;
+    /// Hands over every point of a range of parts.
+    fn visit(&self, parts: Range<usize>, use_point: impl FnMut(&Vec3));
 }
 
-/// Back-projection and voxel grid in one pass over the pixels: the same cloud without the points in between.
-pub fn voxel_grid_of_image(image: &DepthImage, size: f64, workers: &Workers) -> Result<Cloud> {
+impl PointSource for [Vec3] {
+    fn parts(&self) -> usize {
+        self.len()
+    }
+
+    fn visit(&self, parts: Range<usize>, use_point: impl FnMut(&Vec3)) {
+        self.get(parts).unwrap_or_default().iter().for_each(use_point);
+    }
+}
+
+/// Means of points over voxels with side `size`. Points that aren't finite or lie beyond `REACH` voxels are left out.
+pub fn voxel_grid(source: &(impl PointSource + ?Sized), size: f64, workers: &Workers) -> Result<Cloud> {
     check_size(size)?;
-    let sums = in_parts(
-        image.rows(),
-        workers,
-        |rows, grid: &mut Grid| {
-            image.for_each_point(rows, |_, point| grid.add(&point));
-        },
-        size,
-    );
-    Ok(sums.means())
+    let (n, threads) = (source.parts(), workers.threads());
+    let mut grids: Vec<Grid> = (0..threads).map(|_| Grid::new(size)).collect();
+    workers.for_parts(&mut grids, 1, |i, grid| {
+        let parts = n * i / threads..n * (i + 1) / threads;
+        grid.iter_mut().for_each(|grid| source.visit(parts.clone(), |point| grid.add(point)));
+    });
+    // one grid a thread, merged: sums of integers are the same in any order
+    Ok(grids.into_iter().reduce(Grid::merged).map(Grid::means).unwrap_or_default())
 }
 
 fn check_size(size: f64) -> Result<()> {
@@ -61,19 +64,6 @@ fn check_size(size: f64) -> Result<()> {
         true => Ok(()),
         false => Err(Error::Setting { name: "grid", bounds: "a positive number of metres", value: size }),
     }
-}
-
-/// One grid a thread, merged: sums of integers are the same in any order.
-fn in_parts(n: usize, workers: &Workers, add: impl Fn(std::ops::Range<usize>, &mut Grid) + Sync, size: f64) -> Grid {
-    let parts = workers.threads();
-    let mut grids: Vec<Grid> = (0..parts).map(|_| Grid::new(size)).collect();
-    workers.for_parts(&mut grids, 1, |i, grid| {
-        grid.iter_mut().for_each(|grid| add(n * i / parts..n * (i + 1) / parts, grid));
-    });
-    let mut grids = grids.into_iter();
-    let mut first = grids.next().unwrap_or_else(|| Grid::new(size));
-    grids.for_each(|grid| first.merge(grid));
-    first
 }
 
 /// Sums of the positions inside one voxel, in fractions of its side.
@@ -130,10 +120,11 @@ impl Grid {
         self.open = (key, Sum::default());
     }
 
-    fn merge(&mut self, mut other: Grid) {
+    fn merged(mut self, mut other: Grid) -> Self {
         self.close();
         other.close();
         other.voxels.iter().for_each(|(key, sum)| self.voxels.entry(*key).or_default().add(sum));
+        self
     }
 
     fn means(mut self) -> Cloud {
@@ -181,7 +172,6 @@ impl Hasher for KeyHasher {
 #[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
-    use crate::{Camera, Distortion};
     use proptest::prelude::*;
     use std::collections::BTreeMap;
 
@@ -203,7 +193,7 @@ mod tests {
     proptest! {
         #[test]
         fn means_are_those_of_the_definition(points in cloud(), size in 0.01..2.0f64) {
-            let grid = voxel_grid(&points, size, &Workers::new(1)).unwrap();
+            let grid = voxel_grid(points.as_slice(), size, &Workers::new(1)).unwrap();
             let expected = slow(&points, size);
             prop_assert_eq!(grid.counts, expected.iter().map(|(_, n)| *n).collect::<Vec<_>>());
             for (mean, (exact, _)) in grid.points.iter().zip(&expected) {
@@ -213,37 +203,25 @@ mod tests {
 
         #[test]
         fn order_and_threads_change_no_bit(points in cloud(), threads in 1..4usize) {
-            let grid = voxel_grid(&points, 0.3, &Workers::new(1)).unwrap();
+            let grid = voxel_grid(points.as_slice(), 0.3, &Workers::new(1)).unwrap();
             let reversed: Vec<Vec3> = points.iter().rev().copied().collect();
-            prop_assert_eq!(voxel_grid(&reversed, 0.3, &Workers::new(threads)).unwrap(), grid);
+            prop_assert_eq!(voxel_grid(reversed.as_slice(), 0.3, &Workers::new(threads)).unwrap(), grid);
         }
 
         #[test]
         fn any_number_is_survived(numbers in prop::collection::vec(prop::num::f64::ANY, 0..60), size in prop::num::f64::ANY) {
             let points: Vec<Vec3> = numbers.chunks_exact(3).map(Vec3::from_column_slice).collect();
-            if let Ok(grid) = voxel_grid(&points, size, &Workers::new(1)) {
+            if let Ok(grid) = voxel_grid(points.as_slice(), size, &Workers::new(1)) {
                 prop_assert!(grid.points.iter().all(|p| p.iter().all(|c| c.is_finite())));
             }
         }
     }
 
     #[test]
-    fn an_image_and_its_points_give_the_same_cloud() -> Result<()> {
-        let camera =
-            Camera { width: 40, height: 30, fx: 30.0, fy: 30.0, cx: 20.0, cy: 15.0, distortion: Distortion::None };
-        let depth: Vec<f64> = (0..1200).map(|i| 1.0 + f64::from(i % 7) * 0.1).collect();
-        let image = DepthImage::new(crate::geometry::backproject::Depths::Double(&depth), &camera, None, 1.0, None)?;
-        let (_, points) = crate::geometry::backproject::back_project(&image);
-        let workers = Workers::new(2);
-        assert_eq!(voxel_grid_of_image(&image, 0.05, &workers)?, voxel_grid(&points, 0.05, &workers)?);
-        Ok(())
-    }
-
-    #[test]
     fn what_is_too_far_or_no_number_is_left_out() -> Result<()> {
         let far = [Vec3::new(f64::NAN, 0.0, 0.0), Vec3::new(1e300, 0.0, 0.0), Vec3::new(0.0, f64::NEG_INFINITY, 1.0)];
-        assert!(voxel_grid(&far, 0.05, &Workers::new(1))?.points.is_empty());
-        assert!(voxel_grid(&far, 0.0, &Workers::new(1)).is_err());
+        assert!(voxel_grid(far.as_slice(), 0.05, &Workers::new(1))?.points.is_empty());
+        assert!(voxel_grid(far.as_slice(), 0.0, &Workers::new(1)).is_err());
         Ok(())
     }
 }

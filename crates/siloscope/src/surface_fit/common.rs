@@ -84,10 +84,11 @@ impl<'a> OfTiles<'a> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::geometry::depth_image::DepthImage;
     use crate::geometry::parameters::Parameters;
     use crate::geometry::surface::Part;
     use crate::surface_fit::solver::Equation;
-    use crate::surface_fit::tiles::{DepthImage, tile_patches};
+    use crate::surface_fit::tiles::tile_patches;
 
     const SIDE: usize = 60;
 
@@ -96,7 +97,7 @@ mod tests {
         let (width, height) = (8 * SIDE, 8 * SIDE);
         let ray = |i: usize| [(i % width) as f64 / 500.0, (i / width) as f64 / 500.0];
         let (rays, depth): (Vec<_>, _) = ((0..width * height).map(ray).collect(), vec![2.0f32; width * height]);
-        let patches = tile_patches(&DepthImage { width, height, rays: &rays, depth: &depth }, None);
+        let patches = tile_patches(&DepthImage::with_rays(&depth, &rays, width, height).expect("sizes agree"), None);
         assert_eq!(patches.list.len(), SIDE * SIDE);
         let patches = Patches { common_noise: 2.0, ..patches };
         let equation = |i: usize| {

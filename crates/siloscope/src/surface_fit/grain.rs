@@ -3,11 +3,12 @@
 //! Corrugated sheet runs around the silo or up along it: on neighbouring pixels of one of these directions it is nearly
 //! the same. Noise that grows with the incidence looks like relief by its size alone, but is another one in each pixel.
 
+use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::surface::Part;
 use crate::surface_fit::polish::TileEquation;
 use crate::surface_fit::solver::{Fit, Problem};
-use crate::surface_fit::tiles::{DepthImage, Patch, Patches};
+use crate::surface_fit::tiles::{Patch, Patches};
 use crate::{SiloPose, Vec3};
 use std::f64::consts::{FRAC_PI_4, SQRT_2};
 
@@ -151,7 +152,7 @@ mod tests {
             (d + off(i, at.p) / at.gradient.dot(&placed.turn(&q))) as f32
         };
         let depth: Vec<f32> = rays.iter().enumerate().map(measured).collect();
-        let image = DepthImage { width, height, rays: &rays, depth: &depth };
+        let image = DepthImage::with_rays(&depth, &rays, width, height).expect("sizes agree");
         let noise = NoiseLaw::uniform(1e-3);
         let patches = tile_patches(&image, Some(&noise));
         let bias = DepthBias::default();

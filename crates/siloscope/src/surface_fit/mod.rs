@@ -27,6 +27,7 @@ use crate::base::refusal::Refusal;
 use crate::base::workers::Workers;
 use crate::fusion::frame_factor::{FrameShare, among};
 use crate::fusion::relinearize::some_rays;
+use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
 use crate::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
@@ -43,7 +44,7 @@ use crate::surface_fit::model_selection::{Settled, coarse_fit, drop_film, may_be
 use crate::surface_fit::parts::change_without_a_part;
 use crate::surface_fit::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
 use crate::surface_fit::solver::{Fit, OVALITY_STD, Prior, Problem, free_parameters, tukey};
-use crate::surface_fit::tiles::{DepthImage, Patch, Patches, noise_from_scatter, tile_patches};
+use crate::surface_fit::tiles::{Patch, Patches, noise_from_scatter, tile_patches};
 use crate::surface_fit::warm_start::{KnownWall, confirmed};
 
 /// What the caller knows.
@@ -111,7 +112,7 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge, known: Option<&KnownWall>
     }
     patches.unbias_normals(&know.error.bias);
     clock.lap("patches");
-    let (noise, prior, pixel) = (noise(&patches, know), prior(know), pixel_size(image));
+    let (noise, prior, pixel) = (noise(&patches, know), prior(know), image.pixel_size());
     let confirmed = known.and_then(|wall| {
         let found = confirmed(&mut patches, noise, &prior, pixel, wall);
         clock.lap("known wall");
@@ -293,11 +294,6 @@ fn noise(patches: &Patches, know: &Knowledge) -> NoiseLaw {
         let smooth = patches.list.iter().filter(|p| p.smooth);
         noise_from_scatter(&mut smooth.map(|p| (p.measured, p.scatter)).collect::<Vec<_>>(), 1e-4)
     })
-}
-
-fn pixel_size(image: &DepthImage) -> f64 {
-    let (first, last) = (image.rays[0], image.rays[image.width - 1]);
-    (last[0] - first[0]).abs() / (image.width - 1).max(1) as f64
 }
 
 fn prior(know: &Knowledge) -> Prior {

@@ -1,5 +1,6 @@
 //! The last steps of the fit: residuals of pixels, not tiles, against the exact wall.
 
+use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::parameters::Parameters;
 use crate::geometry::sensor::NoiseLaw;
@@ -7,7 +8,7 @@ use crate::stats::robust::{MEDIAN_OF_CHI_SQUARE, median};
 use crate::surface_fit::misfit::{misfit_of, misfit_to_start_from, spread_misfit};
 use crate::surface_fit::residual::{Sampling, tile_residual};
 use crate::surface_fit::solver::{Equation, Fit, Problem, System, tukey, tukey_slope};
-use crate::surface_fit::tiles::{DepthImage, Patch, noise_from_scatter};
+use crate::surface_fit::tiles::{Patch, noise_from_scatter};
 
 /// The equation of one wall tile from its pixels.
 #[derive(Debug, Clone, Copy)]

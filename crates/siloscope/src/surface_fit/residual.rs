@@ -1,9 +1,10 @@
 //! The last step's residuals: every pixel of the wall's tiles against the exact ray–surface intersection.
 
+use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::sensor::DepthBias;
 use crate::geometry::surface::Part;
-use crate::surface_fit::tiles::{DepthImage, MAX_SIDE, Patch, Patches, TileRays};
+use crate::surface_fit::tiles::{MAX_SIDE, Patch, Patches, TileRays};
 
 /// Mean residual of a tile's pixels; no count where the tile does not lie wholly on one part of the wall.
 #[derive(Debug, Clone, Copy, Default)]
@@ -79,7 +80,7 @@ impl Tile<'_> {
         let smooth = Quadratic::through(&nodes, base, self.side);
         let rest = |(at, ray): (f32, [f64; 2])| f64::from((smooth.row(at).value(at) - seen(ray)).abs());
         if self.rays.probes(self.side).into_iter().any(|probe| rest(probe) > QUADRATIC_REST) {
-            let seen = |u: usize, v: usize| seen(self.image.rays[self.corner + v * self.image.width + u]);
+            let seen = |u: usize, v: usize| seen(self.image.ray(self.corner + v * self.image.width + u));
             let exact = |v: usize| std::array::from_fn(|u| if u < self.side { seen(u, v) } else { f32::NAN });
             return self.mean::<MAX_SIDE>(base, exact);
         }
@@ -298,7 +299,7 @@ mod tests {
         let noise = |i: usize| 2e-3 * (((i as f64 * 12.9898).sin() * 43_758.545_3).fract().abs() - 0.5);
         let wall: Vec<f64> = rays.iter().map(|&ray| bias.measured(placed.cylinder_depth(ray))).collect();
         let depth: Vec<f32> = wall.iter().enumerate().map(|(i, d)| (d + noise(i)) as f32).collect();
-        let image = DepthImage { width, height, rays: &rays, depth: &depth };
+        let image = DepthImage::with_rays(&depth, &rays, width, height).expect("sizes agree");
         let patches = tile_patches(&image, Some(&NoiseLaw::uniform(1e-3)));
         let (mut told, mut excess) = (0, 0.0);
         for (i, patch) in patches.list.iter().enumerate().filter(|(_, patch)| patch.measured < 6.0) {

@@ -1,10 +1,11 @@
 //! Which pixel shows what: cylinder, cone, feed, or something else.
 
+use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::label::Label;
 use crate::geometry::surface::Part;
 use crate::surface_fit::SurfaceFit;
-use crate::surface_fit::tiles::{DepthImage, Patch};
+use crate::surface_fit::tiles::Patch;
 
 /// How much of a frame each label covers.
 #[derive(Debug, Clone, Default)]
@@ -28,7 +29,7 @@ fn label(image: &DepthImage, found: &SurfaceFit, placed: &SurfaceEvaluator, (u, 
     if !(measured > 0.0 && measured.is_finite()) {
         return Label::None;
     }
-    let [x, y] = image.rays[i];
+    let [x, y] = image.ray(i);
     let surface = has_company(image, (u, v), 0.02 * measured + 4.0 * found.noise.sigma(measured));
     label_of(found, placed, &crate::Vec3::new(x, y, 1.0), measured, surface)
 }

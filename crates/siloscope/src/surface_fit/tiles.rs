@@ -4,6 +4,7 @@
 //! (dust, edges). Everything up to the last step of the surface fit works on a few thousand patches, not pixels.
 
 use crate::Vec3;
+use crate::geometry::depth_image::DepthImage;
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
 use crate::stats::robust::{MAD_TO_STD, MEDIAN_OF_CHI_SQUARE, median, upper_median};
 
@@ -76,34 +77,6 @@ pub struct Patches {
     pub common_noise: f64,
     /// Whether these come from a cloud without rays.
     pub cloud: bool,
-}
-
-/// A depth image: rays and depths in metres, row by row; depths that are not positive or not finite are missing.
-#[derive(Debug, Clone, Copy)]
-pub struct DepthImage<'a> {
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Ray `(x/z, y/z)` of each pixel.
-    pub rays: &'a [[f64; 2]],
-    /// Depth of each pixel, metres.
-    pub depth: &'a [f32],
-}
-
-impl DepthImage<'_> {
-    /// Depths of up to N pixels from `start` on, 0 beyond `side`.
-    #[inline(always)]
-    pub(crate) fn row<const N: usize>(&self, start: usize, side: usize) -> [f32; N] {
-        let depths = &self.depth[start..start + side];
-        let mut row = [0.0; N];
-        if let Some(whole) = depths.first_chunk::<N>() {
-            row = *whole;
-        } else {
-            row.iter_mut().zip(depths).for_each(|(to, &from)| *to = from);
-        }
-        row
-    }
 }
 
 /// Sums of a plane fit z = a + b·u + c·v over pixels, u and v relative to the tile's centre.
@@ -460,7 +433,7 @@ impl TileRays {
     #[inline]
     fn of(image: &DepthImage, corner: usize, side: usize, planes: [Plane; 2]) -> Self {
         let last = side - 1;
-        let at = |u: usize, v: usize| image.rays[corner + v * image.width + u];
+        let at = |u: usize, v: usize| image.ray(corner + v * image.width + u);
         let [slopes, own_slopes] = planes.map(|plane| [plane.b, plane.c]);
         let (p, q) = (at(last / 2, last / 2), at(last.div_ceil(2), last.div_ceil(2)));
         Self {
