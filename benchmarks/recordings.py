@@ -9,6 +9,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -70,7 +71,8 @@ def by_rosbags(path: Path) -> int:
     with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
         connections = [connection for connection in reader.connections if connection.topic == TOPIC]
         found = reader.messages(connections)
-        return sum(1 for c, _, raw in found if reader.deserialize(raw, c.msgtype).data.view(np.uint16).any())
+        images: Iterator[Any] = (reader.deserialize(raw, connection.msgtype) for connection, _, raw in found)
+        return sum(bool(image.data.view(np.uint16).any()) for image in images)
 
 
 def clouds(folder: Path) -> dict[str, tuple[Path, Callable[[Path], object]]]:
@@ -103,10 +105,10 @@ def main() -> None:
             path = Path(folder) / (name + (".bag" if ros == 1 else ""))
             maker = Maker(ros)
             maker.write(path, messages(maker), **options)
-            ours, theirs = least_ms(lambda path=path: here(path)), least_ms(lambda path=path: by_rosbags(path))
+            ours, theirs = least_ms(partial(here, path)), least_ms(partial(by_rosbags, path))
             table.add_row(f"{name}, {FRAMES} frames", f"{ours:.0f}", f"{theirs:.0f} (rosbags)")
         for name, (path, read) in clouds(Path(folder)).items():
-            ours, theirs = least_ms(lambda path=path: here(path)), least_ms(lambda path=path, read=read: read(path))
+            ours, theirs = least_ms(partial(here, path)), least_ms(partial(read, path))
             table.add_row(f"{name}, {POINTS} points", f"{ours:.0f}", f"{theirs:.0f}")
     Console().print(table)
 

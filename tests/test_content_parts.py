@@ -13,8 +13,9 @@ import realdata
 import siloscope
 from silos import STOUT, known, measured, scene
 from siloscope.content import Datasheet, Density, Strapping, products
-from siloscope.content.density import GRAVITY, choose, load
+from siloscope.content.density import choose, load
 from siloscope.errors import InputError, UsageError
+from siloscope.parameters import GRAVITY
 from siloscope.simulation import Feed, Silo
 
 
