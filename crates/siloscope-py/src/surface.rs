@@ -6,7 +6,7 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use siloscope::base::refusal::Refusal;
 use siloscope::base::workers::Workers;
-use siloscope::fusion::frame_factor::FrameShare;
+use siloscope::fusion::frame_factor::FrameFactor;
 use siloscope::fusion::relinearize::{Ray, seen_from};
 use siloscope::geometry::depth_image::DepthImage;
 use siloscope::geometry::parameters::{Information, PARAMETERS, Parameters};
@@ -141,7 +141,7 @@ fn outcome(py: Python<'_>, found: Outcome) -> PyResult<Bound<'_, PyDict>> {
     }
 }
 
-fn add_share(py: Python<'_>, out: &Bound<'_, PyDict>, share: &FrameShare) -> PyResult<()> {
+fn add_share(py: Python<'_>, out: &Bound<'_, PyDict>, share: &FrameFactor) -> PyResult<()> {
     for (name, m) in [("information", &share.information), ("scatter", &share.scatter), ("noise_share", &share.noise)] {
         out.set_item(name, matrix(py, m)?)?;
     }

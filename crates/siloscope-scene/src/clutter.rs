@@ -1,7 +1,7 @@
 //! Things in the silo: ladder, cables, sweep auger. All are made of round bars.
 
-use crate::bounded;
-use crate::world::{Hit, Label};
+use crate::hit::{Hit, Label};
+use crate::limits::bounded;
 use siloscope::{Result, Vec3};
 
 /// A round bar with round ends.

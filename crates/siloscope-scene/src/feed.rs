@@ -1,10 +1,10 @@
 //! The feed: a height field over the cone's vertex, made of a base shape, a tilt, lumps and ratholes.
 
-use crate::bounded;
+use crate::hit::{Hit, Label};
+use crate::limits::bounded;
 use crate::random::Stream;
 use crate::root::{Probe, first_crossing};
 use crate::silo::Silo;
-use crate::world::{Hit, Label};
 use siloscope::{Result, Vec3};
 
 /// The base shape; heights fall away from (or rise about) the shape's centre.

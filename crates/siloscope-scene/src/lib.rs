@@ -6,6 +6,8 @@
 
 pub mod clutter;
 pub mod feed;
+pub mod hit;
+mod limits;
 pub mod random;
 pub mod relief;
 pub mod render;
@@ -19,17 +21,11 @@ pub mod world;
 
 pub use clutter::{Bar, Bundle};
 pub use feed::{Feed, Lumps, Rathole};
+pub use hit::{Hit, Label};
 pub use relief::{Corrugation, Dent, Film, Relief, Seams};
 pub use render::{Exact, render};
 pub use sensor::Sensor;
 pub use silo::Silo;
 pub use volume::Content;
 pub use wall::Wall;
-pub use world::{Hit, Label, SiloWorld, World};
-
-use siloscope::{Error, Result};
-
-/// Refuses a number outside its bounds by the name the user gave it.
-pub(crate) fn bounded(name: &'static str, value: f64, low: f64, high: f64, bounds: &'static str) -> Result<()> {
-    if (low..=high).contains(&value) { Ok(()) } else { Err(Error::Setting { name, bounds, value }) }
-}
+pub use world::{SiloWorld, World};

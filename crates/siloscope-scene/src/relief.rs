@@ -2,7 +2,7 @@
 //!
 //! All heights are measured outwards from the perfect wall, over the arc `s = R·azimuth` and z.
 
-use crate::bounded;
+use crate::limits::bounded;
 use siloscope::Result;
 use std::f64::consts::TAU;
 

@@ -1,6 +1,7 @@
 //! Frames of a world, exact.
 
-use crate::world::{Label, World};
+use crate::hit::Label;
+use crate::world::World;
 use siloscope::{Camera, Error, Result, SiloPose, Vec3};
 
 /// An exact frame; row by row.
@@ -70,8 +71,8 @@ pub fn check_threads(threads: usize) -> Result<()> {
 
 fn check_pose(pose: &SiloPose) -> Result<()> {
     use std::f64::consts::PI;
-    crate::bounded("r_x", pose.r_x, -PI, PI, "between -π and π rad")?;
-    crate::bounded("r_y", pose.r_y, -PI, PI, "between -π and π rad")?;
-    crate::bounded("t_x", pose.t_x, -1e3, 1e3, "between -1000 and 1000 m")?;
-    crate::bounded("t_y", pose.t_y, -1e3, 1e3, "between -1000 and 1000 m")
+    crate::limits::bounded("r_x", pose.r_x, -PI, PI, "between -π and π rad")?;
+    crate::limits::bounded("r_y", pose.r_y, -PI, PI, "between -π and π rad")?;
+    crate::limits::bounded("t_x", pose.t_x, -1e3, 1e3, "between -1000 and 1000 m")?;
+    crate::limits::bounded("t_y", pose.t_y, -1e3, 1e3, "between -1000 and 1000 m")
 }

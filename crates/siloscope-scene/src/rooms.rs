@@ -1,7 +1,8 @@
 //! Worlds that are no silo, to see whether they are taken for one.
 
+use crate::hit::{Hit, Label};
 use crate::random::Stream;
-use crate::world::{Hit, Label, World};
+use crate::world::World;
 use siloscope::{Error, Result, Vec3};
 
 /// A convex room bounded by planes `normal · p = offset`, seen from inside. Without planes there is nothing to see.

@@ -1,7 +1,7 @@
 //! The sensor: what it makes of exact depths (Eqs. 8–10, and more general laws).
 
-use crate::bounded;
 use crate::feed::spline;
+use crate::limits::bounded;
 use crate::random::Stream;
 use crate::render::{Exact, check_threads};
 use siloscope::{Camera, Error, Result};

@@ -1,7 +1,7 @@
 //! The silo: a cylinder on a cone with an outlet, in the silo frame (z down, 0 at the camera's height).
 
-use crate::bounded;
-use crate::world::{Hit, Label};
+use crate::hit::{Hit, Label};
+use crate::limits::bounded;
 use siloscope::{Result, Vec3};
 
 /// Cylinder from z = `top` over `cylinder_height`, then a cone whose vertex is `cone_height` further down. Metres.

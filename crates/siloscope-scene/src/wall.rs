@@ -1,10 +1,10 @@
 //! Walls that are not perfect: uneven and oval, found along the ray by safe steps.
 
-use crate::bounded;
+use crate::hit::{Hit, Label};
+use crate::limits::bounded;
 use crate::relief::{Limits, Relief};
 use crate::root::{Probe, first_crossing};
 use crate::silo::Silo;
-use crate::world::{Hit, Label};
 use siloscope::{Result, Vec3};
 
 /// Feed on the wall is labelled as feed from this thickness on, metres.

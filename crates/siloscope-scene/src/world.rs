@@ -2,21 +2,10 @@
 
 use crate::clutter::Bundle;
 use crate::feed::Feed;
+use crate::hit::{Hit, Label};
 use crate::silo::{Exit, Silo};
 use crate::wall::Wall;
-pub use siloscope::geometry::label::Label;
 use siloscope::{Error, Result, Vec3};
-
-/// Where a ray ends.
-#[derive(Debug, Clone)]
-pub struct Hit {
-    /// Parameter along the ray; the depth for rays `(x, y, 1)` of the camera.
-    pub t: f64,
-    /// Unit normal towards the air, in the world's frame.
-    pub normal: Vec3,
-    /// What was hit.
-    pub label: Label,
-}
 
 /// A world that rays can be cast into. Coordinates are those of the silo frame.
 pub trait World: Sync {

@@ -1,6 +1,5 @@
 //! The silo's wall as a bound of its content: which returns lie on it, which inside, which beyond.
 
-use super::cells::Cell;
 use super::returns::Line;
 use crate::geometry::sensor::NoiseLaw;
 
@@ -20,7 +19,7 @@ pub struct Bound {
 }
 
 /// Step of the margins' table, metres.
-const STEP: f32 = 0.02;
+pub const STEP: f32 = 0.02;
 
 /// On which side of the wall a return lies.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -89,13 +88,9 @@ impl Bound {
         }
     }
 
-    /// Whether the wall takes no return from a cell with this middle and side.
-    pub fn clears(&self, [x, y]: [f64; 2], side: f64, cell: &Cell) -> bool {
-        let far = x.hypot(y) + 0.5 * f64::sqrt(2.0) * side;
-        let [px, py, pz] = cell.mean.map(|m| m as f32);
-        let out = far as f32 / px.hypot(py).max(1e-6);
-        !cell.seen() && far < f64::from(self.radius)
-            || cell.seen() && self.side([px * out, py * out, pz], pz.max(STEP)) == Side::Inside
+    /// Radius of the cylinder, metres.
+    pub fn radius(&self) -> f64 {
+        f64::from(self.radius)
     }
 
     #[inline]

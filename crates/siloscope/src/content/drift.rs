@@ -5,7 +5,7 @@
 //! density n of the returns at each side (the linear form of Tweedie's formula). Without the correction a surface would
 //! tilt by some tenths of a millimetre per metre, and more where it is continued.
 
-use super::bound::Bound;
+use super::bound::{Bound, STEP, Side};
 use super::cells::Cell;
 use super::doubt::Lever;
 use super::grid::Grid;
@@ -13,11 +13,20 @@ use crate::geometry::sensor::NoiseLaw;
 
 /// Takes the drift out of the cells' means.
 pub fn settle(cells: &mut [Cell], grid: &Grid, bound: &Bound, noise: &NoiseLaw, lever: &Lever) {
-    let whole: Vec<bool> = (0..cells.len()).map(|i| bound.clears(grid.middle(i), grid.cell(), &cells[i])).collect();
+    let whole: Vec<bool> = (0..cells.len()).map(|i| clears(bound, grid.middle(i), grid.cell(), &cells[i])).collect();
     let drifts: Vec<[f64; 3]> = (0..cells.len()).map(|i| drift(i, cells, &whole, grid, noise, lever)).collect();
     for (cell, drift) in cells.iter_mut().zip(drifts) {
         cell.mean = [0, 1, 2].map(|k| cell.mean[k] - drift[k]);
     }
+}
+
+/// Whether the wall takes no return from a cell with this middle and side.
+fn clears(bound: &Bound, [x, y]: [f64; 2], side: f64, cell: &Cell) -> bool {
+    let far = x.hypot(y) + 0.5 * f64::sqrt(2.0) * side;
+    let [px, py, pz] = cell.mean.map(|m| m as f32);
+    let out = far as f32 / px.hypot(py).max(1e-6);
+    !cell.seen() && far < bound.radius()
+        || cell.seen() && bound.side([px * out, py * out, pz], pz.max(STEP)) == Side::Inside
 }
 
 /// How far a cell's mean is off, metres.

@@ -11,39 +11,13 @@ use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::parameters::{Information, PARAMETERS, Parameters};
 use crate::geometry::sensor::DepthBias;
 use crate::geometry::surface::{Part, SiloSurface};
-use crate::surface_fit::polish::TileEquation;
-use crate::surface_fit::solver::tukey;
 use nalgebra::{Cholesky, Const};
 
 /// Rays that a frame keeps.
 pub const RAYS: usize = 32;
 
-/// Least share of the rays for a part that is seen.
-const LEAST: usize = RAYS / 4;
-
 /// A ray (x, y, 1) of the camera frame and its information, 1/m²; none where that is 0.
 pub type Ray = [f64; 3];
-
-/// Some of the wall tiles' rays, of both parts, with the information of all; `ray_of` tells that of a patch.
-pub fn some_rays(tiles: &[TileEquation], ray_of: impl Fn(usize) -> Vec3) -> Vec<Ray> {
-    let of_part = |part: Part| tiles.iter().filter(|t| t.equation.part == part).collect::<Vec<_>>();
-    let (cylinder, cone) = (of_part(Part::Cylinder), of_part(Part::Cone));
-    let share = RAYS * cone.len() / tiles.len().max(1);
-    let most = RAYS - LEAST.min(cylinder.len());
-    let of_cone = share.max(LEAST.min(cone.len())).min(most);
-    [(cylinder, RAYS - of_cone), (cone, of_cone)].iter().flat_map(|(tiles, n)| spread(tiles, *n, &ray_of)).collect()
-}
-
-/// At most n of the tiles, evenly among them, each with the information of those it stands for.
-fn spread(tiles: &[&TileEquation], n: usize, ray_of: &impl Fn(usize) -> Vec3) -> Vec<Ray> {
-    let n = n.min(tiles.len());
-    let stands_for = tiles.len() as f64 / n.max(1) as f64;
-    let ray = |tile: &TileEquation| {
-        let (q, e) = (ray_of(tile.patch), &tile.equation);
-        [q.x, q.y, stands_for * tukey(e.residual * e.residual / e.variance) / e.variance]
-    };
-    (0..n).map(|k| ray(tiles[(2 * k + 1) * tiles.len() / (2 * n)])).collect()
-}
 
 /// A wall and a depth bias, ready to predict readings.
 struct Place {

@@ -2,7 +2,7 @@
 
 use crate::geometry::surface::Part;
 use crate::stats::robust::{MAD_TO_STD, median, upper_median};
-use crate::surface_fit::polish::TileEquation;
+use crate::surface_fit::equation::TileEquation;
 use crate::surface_fit::solver::{Fit, tukey};
 
 /// How true a tile's mean is at best, metres: its pixels are held against a quadratic. A smaller misfit would take the

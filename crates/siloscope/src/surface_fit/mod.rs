@@ -5,7 +5,10 @@ pub mod cloud_tiles;
 pub mod common;
 pub mod covariance;
 pub mod diagnostics;
+pub mod equation;
+pub mod factor;
 pub mod grain;
+pub mod likelihood;
 mod misfit;
 pub mod model_selection;
 pub mod outermost;
@@ -25,8 +28,7 @@ use crate::Vec3;
 use crate::base::clock::Clock;
 use crate::base::refusal::Refusal;
 use crate::base::workers::Workers;
-use crate::fusion::frame_factor::{FrameShare, among};
-use crate::fusion::relinearize::some_rays;
+use crate::fusion::frame_factor::{FrameFactor, restrict};
 use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
@@ -39,8 +41,10 @@ use crate::surface_fit::covariance::{
     relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened,
 };
 use crate::surface_fit::diagnostics::WallEvidence;
+use crate::surface_fit::factor::{frame_factor, some_rays};
 use crate::surface_fit::grain::relief_with_grain;
-use crate::surface_fit::model_selection::{Settled, coarse_fit, drop_film, may_be_feed};
+use crate::surface_fit::likelihood::may_be_feed;
+use crate::surface_fit::model_selection::{Settled, coarse_fit, drop_film};
 use crate::surface_fit::parts::change_without_a_part;
 use crate::surface_fit::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
 use crate::surface_fit::solver::{Fit, OVALITY_STD, Prior, Problem, free_parameters, tukey};
@@ -66,7 +70,7 @@ pub struct SurfaceFit {
     /// Covariance over all parameters; zero rows for those that are not free.
     pub covariance: Information,
     /// What this frame alone says, without priors (for fusing frames).
-    pub share: FrameShare,
+    pub share: FrameFactor,
     /// Which parameters are estimated.
     pub free: [bool; PARAMETERS],
     /// Noise law used.
@@ -351,8 +355,8 @@ fn finish(
     }
     let bias_is_free = free[7..OVALITY].contains(&true);
     let rays = if bias_is_free { some_rays(tiles, |patch| problem.patches.list[patch].q) } else { Vec::new() };
-    let share = FrameShare::new((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free), (base, rays));
-    let mut covariance = among(&covariance, &free);
+    let share = frame_factor((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free), (base, rays));
+    let mut covariance = restrict(&covariance, &free);
     if !free[8] {
         covariance += scale_uncertainty(&fit, problem.prior.bias_std[1]);
     }

@@ -5,12 +5,12 @@ use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
 use crate::geometry::surface::{FEED_SLOPE, Part, SurfaceTolerance};
 use crate::surface_fit::diagnostics::{WallEvidence, wall_evidence};
+use crate::surface_fit::likelihood::{likelihood, may_be_feed};
 use crate::surface_fit::outermost::{FILM, outermost, stuck};
 use crate::surface_fit::proposals::{Oriented, Start, View, other_part, starts, steeper_cone};
 use crate::surface_fit::solver::{Fit, Prior, Problem};
 use crate::surface_fit::taper::cone_instead;
 use crate::surface_fit::tiles::{NONE, Patches};
-use crate::surface_fit::vertex::is_covered;
 
 /// A fit on patches that stands up to the evidence.
 #[derive(Debug, Clone)]
@@ -129,11 +129,6 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
     Ok(Settled { fit, wall, evidence, bare })
 }
 
-/// Whether the cone could as well be feed.
-pub(crate) fn may_be_feed(problem: &Problem, fit: &Fit) -> bool {
-    fit.surface.cone.is_some_and(|c| c.may_be_feed()) && !is_covered(problem, fit)
-}
-
 /// The fit with a steeper cone about the same axis in place of one that may be feed, or else without a cone.
 fn without_feed(problem: &Problem, fit: Fit) -> Result<Fit, Refusal> {
     if let Some(surface) = steeper_cone(&fit.surface, FEED_SLOPE, &oriented(problem, &fit.bias)) {
@@ -208,16 +203,6 @@ fn oriented(problem: &Problem, bias: &DepthBias) -> Vec<Oriented> {
         })
         .filter(|o| o.p.x.is_finite() && o.p.z.is_finite())
         .collect()
-}
-
-/// Log-likelihood gain of calling every `stride`-th patch wall instead of anything else, where the fit says so.
-pub(crate) fn likelihood(problem: &Problem, fit: &Fit, stride: usize) -> f64 {
-    let placed = SurfaceEvaluator::new(fit.surface);
-    let gain = |(i, &weight): (usize, &f64)| {
-        let contact = if weight > 0.0 { problem.contact(fit, &placed, i) } else { None };
-        contact.map_or(0.0, |e| weight * (0.5 / (e.variance.sqrt() * e.cosine)).ln().max(0.0))
-    };
-    fit.weights.iter().enumerate().step_by(stride).map(gain).sum()
 }
 
 /// The part of which hardly any wall patch is left, so that its parameters would be undetermined.

@@ -5,29 +5,11 @@ use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::parameters::Parameters;
 use crate::geometry::sensor::NoiseLaw;
 use crate::stats::robust::{MEDIAN_OF_CHI_SQUARE, median};
+pub use crate::surface_fit::equation::TileEquation;
 use crate::surface_fit::misfit::{misfit_of, misfit_to_start_from, spread_misfit};
 use crate::surface_fit::residual::{Sampling, tile_residual};
 use crate::surface_fit::solver::{Equation, Fit, Problem, System, tukey, tukey_slope};
 use crate::surface_fit::tiles::{Patch, noise_from_scatter};
-
-/// The equation of one wall tile from its pixels.
-#[derive(Debug, Clone, Copy)]
-pub struct TileEquation {
-    /// Index of the patch.
-    pub patch: usize,
-    /// Its equation.
-    pub equation: Equation,
-    /// Variance of the residual by the noise alone.
-    pub noise: f64,
-    /// Variance of a single pixel along the ray, m², that the noise law expects (a cloud's own); some tiles have more.
-    pub expected: f64,
-    /// Scatter of the pixels about the tile's mean, metres along the ray.
-    pub scatter: f64,
-    /// Number of its pixels.
-    pub count: f64,
-    /// How far the residual may be off along this ray, as a multiple of the fit's misfit.
-    pub spread: f64,
-}
 
 /// One Gauss–Newton step on pixel residuals; returns the noise law, from the residuals themselves where none is known.
 pub fn polish(
@@ -189,18 +171,4 @@ pub fn solve_equations(
     fit.surface = fit.surface.stepped(&total);
     fit.bias = fit.bias.stepped(&total);
     Some(system)
-}
-
-impl TileEquation {
-    /// How much the tile pulls at the answer: its weighted residual in units of its variance.
-    pub fn pull(&self) -> f64 {
-        let Equation { residual, variance, .. } = self.equation;
-        tukey(residual * residual / variance) * residual / variance
-    }
-
-    /// Puts a misfit into the variance.
-    pub fn allow(&mut self, misfit: f64) {
-        let along = misfit * self.spread;
-        self.equation.variance = self.noise + along * along;
-    }
 }

@@ -10,7 +10,8 @@ use crate::geometry::evaluator::{ImplicitSample, SurfaceEvaluator};
 use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
 use crate::geometry::surface::{Cone, Part, SiloSurface};
-use crate::stats::robust::{self, MAD_TO_STD, upper_median};
+use crate::stats::robust::{MAD_TO_STD, upper_median};
+pub use crate::surface_fit::equation::{Equation, tukey, tukey_slope};
 use crate::surface_fit::tiles::Patches;
 
 /// What is known before the frame is looked at.
@@ -53,25 +54,6 @@ pub struct Fit {
     pub weights: Vec<f64>,
 }
 
-/// One patch's equation.
-#[derive(Debug, Clone, Copy)]
-pub struct Equation {
-    /// Residual along the ray, metres.
-    pub residual: f64,
-    /// Derivative of the residual.
-    pub jacobian: Parameters,
-    /// Variance of the residual: noise of the mean and misfit.
-    pub variance: f64,
-    /// Cosine between the ray and the wall's normal: residual × cosine is the distance from the wall.
-    pub cosine: f64,
-    /// Part of the wall.
-    pub part: Part,
-    /// Height in the silo frame.
-    pub z: f64,
-    /// Position across the axis: x and y in the silo frame.
-    pub across: [f64; 2],
-}
-
 /// Everything that stays the same during a fit.
 #[derive(Debug, Clone, Copy)]
 pub struct Problem<'a> {
@@ -90,8 +72,6 @@ const SURFACE: usize = 7;
 
 /// Smallest misfit assumed, metres: what rounding in the tiles' own means amounts to.
 const MISFIT_FLOOR: f64 = 2e-4;
-/// Residuals beyond this many standard deviations have no weight (Tukey's constant).
-const TUKEY: f64 = 4.7;
 
 /// A patch held against the wall: what its weight asks for, and what its equation is made of.
 #[derive(Debug, Clone, Copy)]
@@ -259,18 +239,6 @@ impl Problem<'_> {
             fit.surface.radius = None;
         }
     }
-}
-
-/// Tukey's weight for a squared residual in units of its variance.
-#[inline]
-pub fn tukey(squared: f64) -> f64 {
-    robust::tukey_weight(squared, TUKEY)
-}
-
-/// Derivative of residual × weight by the residual, for a squared residual in units of its variance.
-#[inline]
-pub fn tukey_slope(squared: f64) -> f64 {
-    robust::tukey_slope(squared, TUKEY)
 }
 
 /// What the agreeing patches' distances from the wall need beside the noise; at most halves in one step.

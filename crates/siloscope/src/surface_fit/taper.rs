@@ -1,7 +1,7 @@
 //! Cylinder or cone? A small piece of a cone looks like a cylinder about another axis.
 
 use crate::geometry::surface::{Cone, SiloSurface};
-use crate::surface_fit::model_selection::{likelihood, may_be_feed};
+use crate::surface_fit::likelihood::{likelihood, may_be_feed};
 use crate::surface_fit::solver::{Fit, Problem};
 use crate::surface_fit::tiles::Patch;
 use crate::{SiloPose, Vec3};
