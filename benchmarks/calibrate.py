@@ -129,7 +129,7 @@ def short_way(folder: Path) -> Table:
     table.add_column("")
     for head in ("from nothing", "the short way"):
         table.add_column(head, justify="right")
-    short = [one for one in led if "coarse_fit" not in one.timing_ms and one.ok]
+    short = [one for one, other in zip(led, alone, strict=True) if one.ok and one.pose != other.pose]
     searched = [one for one in alone if one.ok]
     for stage in ("patches", "coarse_fit", "known_wall", "pixels", "covariance"):
         cells = [f"{np.median([one.timing_ms.get(stage, 0.0) for one in group]):.2f}" for group in (searched, short)]

@@ -16,7 +16,6 @@ import recording_files
 import siloscope
 from siloscope import Camera, Frame, InputError
 from siloscope.cli import main
-from siloscope.io.clouds import e57
 
 CLOUDS = "formats_las_e57"
 MUG = ("azure_kinect_mkv_mug", "recording.mkv")
@@ -317,8 +316,13 @@ def test_a_film_is_no_depth_recording(tmp_path: Path) -> None:
         siloscope.open(path)
 
 
-def test_an_e57_packet_too_short_for_its_head_is_damage() -> None:
-    scan = e57.Scan("scan 0", 1, 0, ())
-    section = memoryview(struct.pack("<BBHH", 1, 0, 0, 0))  # a data packet of one byte
-    with pytest.raises(InputError, match="shorter than its own head"):
-        list(e57._packets(scan, section))
+def test_an_e57_packet_too_short_for_its_head_is_damage(tmp_path: Path) -> None:
+    file = bytearray(recording_files.e57())
+    head = 48 + 32  # behind the file's head and that of the first section
+    assert struct.unpack_from("<BB", file, head) == (1, 0)
+    struct.pack_into("<H", file, head + 2, 0)  # a data packet of one byte
+    path = tmp_path / "short.e57"
+    path.write_bytes(recording_files.with_checksums(bytes(file)))
+    source = siloscope.open(path)
+    assert len(list(source)) == 1, "the other scan is whole"
+    assert "shorter than its own head" in source.problems[0]

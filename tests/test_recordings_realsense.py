@@ -101,7 +101,7 @@ def test_d435_in_an_office_corner_is_refused_with_a_reason(capsys: pytest.Captur
 def test_extrinsics_are_rotations_from_the_reference_to_the_stream() -> None:
     """Depth to colour of this file as the SDK (2.59.1) gives it, written row by row."""
     bag = Rosbag1(realdata.path(*D435))
-    rotation = realsense._rotations(bag, "/device_0/sensor_1/Color_0")["0"]
+    rotation = realsense.rotations(bag, "/device_0/sensor_1/Color_0")["0"]
     expected = [[0.999863, -0.01031, 0.0129259], [0.0103087, 0.999947, 0.00017303], [-0.012927, -3.97579e-05, 0.999916]]
     np.testing.assert_allclose(rotation, expected, atol=1e-6)
 
@@ -111,7 +111,7 @@ def test_db3_extrinsics_are_written_column_by_column() -> None:
     maker = Maker(1)
     wire = maker.store.serialize_ros1(maker.new("std_msgs/msg/String", made_up), "std_msgs/msg/String")
     topic = _one_message(bytes(wire))
-    rotation = realsense._rotation(topic, topic.topics["/a/tf/ref_1"])
+    rotation = realsense.rotation_of_topic(topic, topic.topics["/a/tf/ref_1"])
     np.testing.assert_array_equal(rotation, [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from siloscope import SiloPose, UsageError
 from siloscope.cli import main
@@ -428,7 +429,9 @@ def test_a_second_run_works_nothing_and_writes_the_same(
     everything: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("siloscope.reproduction.trials.Trial.run", lambda _: pytest.fail("ran again"))
-    monkeypatch.setattr("siloscope.reproduction.evaluation.reproduction._drawn", lambda path, *_: path)
+    blank = io.BytesIO()
+    Image.new("RGB", (4, 4)).save(blank, "PNG")
+    monkeypatch.setattr("siloscope.reporting.plots.style.png", lambda *_: blank.getvalue())
     before = (everything / "results.md").read_text()
     capsys.readouterr()
     assert main(["reproduce", "--steps", "1", "--jobs", "1", "--out", str(everything), "--json"]) == 0

@@ -160,7 +160,7 @@ def test_a_known_diameter_tells_the_scale_by_few_patches_of_the_cylinder() -> No
     diameter = 2 * scene.silo.radius
     found = fit(scene, None, diameter=diameter)
     led = fit(scene, None, diameter=diameter, start=fit(scenes[81], None, diameter=diameter))
-    assert "coarse_fit" not in led.timing_ms
+    assert led.pose != found.pose  # it took the short way
     for one in (found, led):
         assert one.silo.radius is None
         assert gap(one, scene) < 2.0  # 13.7 and 8.2 where the scale is not told

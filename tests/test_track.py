@@ -16,7 +16,7 @@ from silos import known, scene
 from siloscope.content import Content, Parts
 from siloscope.errors import InputError, UsageError
 from siloscope.simulation import Feed
-from siloscope.track import _told
+from siloscope.track import track_of
 from siloscope.tracking.events import legs
 from siloscope.tracking.story import Moment
 from siloscope.types.track import DAY, utc
@@ -35,7 +35,7 @@ def story(volumes: list[float | None], hours: float = 1.0, noise: float = 0.002)
             else Content("ok", volume=volume, volume_std=0.02, parts=parts, capacity=10.0, mass=600.0 * volume)
         )
         moments.append(Moment(i, START + 3600.0 * hours * i, content, None))
-    return _told(moments, None, ())
+    return track_of(moments)
 
 
 def test_a_quiet_silo_has_no_events() -> None:
@@ -102,7 +102,7 @@ def test_only_frames_taken_together_tell_that_the_content_moves() -> None:
 
 def test_without_times_there_is_no_use() -> None:
     moments = [Moment(i, None, Content("ok", volume=5.0 - i, volume_std=0.1), None) for i in range(4)]
-    assert _told(moments, None, ()).use is None
+    assert track_of(moments).use is None
 
 
 @given(st.lists(st.floats(0.0, 10.0), min_size=2, max_size=60), st.floats(0.01, 3.0))

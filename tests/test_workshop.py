@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import pytest
 import yaml
 
 ROOT = Path(__file__).parents[1]
+CHECKS = sorted(path for part in ("tests", "benchmarks") for path in (ROOT / part).rglob("*.py"))
 MANIFEST = (
     '[workspace]\nresolver = "2"\nmembers = ["one"]\n\n[workspace.package]\nversion = "0.1.0"\nedition = "2024"\n'
 )
@@ -127,3 +129,35 @@ def test_the_announced_version_is_not_behind_the_program() -> None:
     assert first is not None
     assert program is not None
     assert [int(part) for part in first.groups()] >= [int(part) for part in program.groups()]
+
+
+def private_names(source: str) -> list[str]:
+    """Private names of others that a module imports, reads or patches; its own objects' (`self`, `cls`) are none."""
+    found = []
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom):
+            found += [alias.name for alias in node.names]
+        elif isinstance(node, ast.Attribute) and getattr(node.value, "id", "") not in ("self", "cls", "os"):
+            found.append(node.attr)
+        elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") in ("setattr", "delattr"):
+            found += [str(part.value).rsplit(".", 1)[-1] for part in node.args[:2] if isinstance(part, ast.Constant)]
+    return [name for name in found if name.startswith("_") and not name.startswith("__") and name != "_core"]
+
+
+@pytest.mark.parametrize(
+    ("source", "found"),
+    [
+        ("from a import _b, c", ["_b"]),
+        ("a.c()._b", ["_b"]),
+        ('monkeypatch.setattr(a, "_b", 1)', ["_b"]),
+        ('monkeypatch.setattr("a.c._b", 1)', ["_b"]),
+        ("self._b, a.__name__, os._exit(1)\nfrom siloscope import _core", []),
+    ],
+)
+def test_private_names_are_noticed(source: str, found: list[str]) -> None:
+    assert private_names(source) == found
+
+
+@pytest.mark.parametrize("path", [path.relative_to(ROOT) for path in CHECKS], ids=str)
+def test_no_test_reaches_into_a_private_name(path: Path) -> None:
+    assert private_names((ROOT / path).read_text("utf-8")) == []

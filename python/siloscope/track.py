@@ -78,7 +78,7 @@ def track(
     if all(moment.content.status == "unreadable" for moment in moments):
         causes = (*(str(moment.content.message) for moment in moments), *problems, "give at least one")
         raise InputError(f"no frame could be used; {causes[0]}")
-    return _told(moments, last, problems)
+    return track_of(moments, last, problems)
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,8 @@ def _together(before: float | None, now: float | None) -> bool:
     return before is not None and now is not None and 0.0 <= now - before <= TOGETHER
 
 
-def _told(moments: list[Moment], last: Content | None, problems: tuple[str, ...]) -> Track:
+def track_of(moments: Sequence[Moment], last: Content | None = None, problems: tuple[str, ...] = ()) -> Track:
+    """The story of readings in their order; `last` is the newest one with its surface, `problems` what was not read."""
     answered = [m for m in moments if m.content.volume is not None]
     happened = tuple(events(answered))
     readings = tuple(_readings(moments))
@@ -139,7 +140,7 @@ def _told(moments: list[Moment], last: Content | None, problems: tuple[str, ...]
     )
 
 
-def _readings(moments: list[Moment]) -> Iterator[Reading]:
+def _readings(moments: Sequence[Moment]) -> Iterator[Reading]:
     """The rows of the table; where the cone is not known, heights are over the lowest point of the whole story."""
     lowest = max((m.datum for m in moments if m.datum is not None), default=0.0)
     before: Moment | None = None

@@ -101,8 +101,8 @@ class RealSenseSource(RecordedSource):
         found, how = gravity.at_rest(gravity.accelerations(self.recording, accel))
         if found is None:
             return None, how
-        depth_r = _rotations(self.recording, self._base)
-        accel_r = _rotations(self.recording, accel.name.removesuffix("/imu/data"))
+        depth_r = rotations(self.recording, self._base)
+        accel_r = rotations(self.recording, accel.name.removesuffix("/imu/data"))
         shared = depth_r.keys() & accel_r.keys()
         if not shared:
             # The SDK turns accelerometer data to the depth camera's axes; only small misalignments remain.
@@ -199,19 +199,19 @@ def _camera_from_info(recording: Recording, base: str) -> Camera | None:
     return None
 
 
-def _rotations(recording: Recording, base: str) -> dict[str, NDArray[np.float64]]:
+def rotations(recording: Recording, base: str) -> dict[str, NDArray[np.float64]]:
     """Rotations from reference frames, by their name, to the stream's own frame: ``v_stream = R @ v_reference``."""
     start = f"{base}/tf/"
     found: dict[str, NDArray[np.float64]] = {}
     for name, topic in recording.topics.items():
         if name.startswith(start):
-            rotation = or_none(_rotation, recording, topic)
+            rotation = or_none(rotation_of_topic, recording, topic)
             if rotation is not None:
                 found[name.removeprefix(start)] = rotation
     return found
 
 
-def _rotation(recording: Recording, topic: Topic) -> NDArray[np.float64] | None:
+def rotation_of_topic(recording: Recording, topic: Topic) -> NDArray[np.float64] | None:
     wire, kind = recording.first(topic.name), topic.type
     if wire is None:
         return None
