@@ -25,7 +25,7 @@ from rich.table import Table
 
 import siloscope
 from siloscope import Estimate, sensors
-from siloscope.calibrate import SEARCHED
+from siloscope.fusion.schedule import FULL_SEARCH_PERIOD
 from siloscope.io import writers
 from siloscope.io.images import png
 from siloscope.simulation import ASTRA_S, discharge
@@ -123,7 +123,7 @@ def short_way(folder: Path) -> Table:
         for number, frame in enumerate(source):
             alone.append(siloscope.locate(frame, sensor=profile))
             led.append(siloscope.locate(frame, sensor=profile, start=start, ratios=False))
-            if number % SEARCHED == 0 and alone[-1].ok:
+            if number % FULL_SEARCH_PERIOD == 0 and alone[-1].ok:
                 start = alone[-1]
     table = Table(title="from nothing, and from a wall seen before", title_justify="left")
     table.add_column("")

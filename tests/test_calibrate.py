@@ -16,8 +16,9 @@ import pytest
 from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, _core, calibrate, locate, sensors
 from siloscope.cli import main
 from siloscope.estimation.surface import fit_depth
-from siloscope.fusion.relinearize import straightened
-from siloscope.fusion.solve import LENGTHS, SCALE, Stack, sums
+from siloscope.fusion.factors import LENGTHS, FrameFactors
+from siloscope.fusion.relinearize import relinearized
+from siloscope.fusion.solve import SCALE, summed
 from siloscope.parameters import PARAMETERS
 from siloscope.reproduction.discharges import real
 from siloscope.simulation import ASTRA_S, Feed, Scene, discharge
@@ -102,21 +103,21 @@ def test_distances_are_the_quadratic_forms_of_the_gaps(sensor: str | None) -> No
     blind = replace(
         evidence[0], parameters=np.where(cone, np.nan, evidence[0].parameters), free=evidence[0].free & ~cone
     )
-    stack = Stack([blind, *evidence[1:]])
+    factors = FrameFactors([blind, *evidence[1:]])
     draw = np.random.default_rng(4)
-    centres = np.nan_to_num(stack.answers[[0, 3, 5, 7, 7, 7]]) + draw.normal(0.0, 1e-3, (6, 12))
-    centres[:, SCALE] = stack.answers[0, SCALE] + np.array([0.0, 0.0, 0.0, 0.0, 0.01, 0.0])
+    centres = np.nan_to_num(factors.answers[[0, 3, 5, 7, 7, 7]]) + draw.normal(0.0, 1e-3, (6, 12))
+    centres[:, SCALE] = factors.answers[0, SCALE] + np.array([0.0, 0.0, 0.0, 0.0, 0.01, 0.0])
     centres[5, 5:7] = np.nan  # one that has no cone
 
     def distance(centre: np.ndarray, frame: int) -> float:
-        gap = np.nan_to_num(stack.answers[frame] - centre)  # what either has not seen does not part them
-        if not stack.free[frame, SCALE]:
-            gap[list(LENGTHS)] += gap[SCALE] * np.where(stack.seen[frame], np.nan_to_num(centre), 0.0)[list(LENGTHS)]
-        return float(gap @ stack.metric[frame] @ gap)
+        gap = np.nan_to_num(factors.answers[frame] - centre)  # what either has not seen does not part them
+        if not factors.free[frame, SCALE]:
+            gap[list(LENGTHS)] += gap[SCALE] * np.where(factors.seen[frame], np.nan_to_num(centre), 0.0)[list(LENGTHS)]
+        return float(gap @ factors.metric[frame] @ gap)
 
-    expected = [[distance(centre, frame) for frame in range(stack.count)] for centre in centres]
-    np.testing.assert_allclose(stack.distances(centres), expected, rtol=1e-6)
-    few = stack.take(slice(2, 5))
+    expected = [[distance(centre, frame) for frame in range(factors.count)] for centre in centres]
+    np.testing.assert_allclose(factors.distances(centres), expected, rtol=1e-6)
+    few = factors.take(slice(2, 5))
     np.testing.assert_allclose(few.distances(centres), np.array(expected)[:, 2:5], rtol=1e-6)
 
 
@@ -145,22 +146,27 @@ def test_frames_agree_once_their_equations_are_made_about_the_common_answer() ->
     _, frames = unseen(2018, "gaussian+tilted", False)
     found = calibrate(frames)
     assert found.parameters is not None
-    alone = Stack([e.evidence for e in frames if e.evidence])
-    furthest = [np.sqrt(s.distances(found.parameters[None])[0] / s.dof).max() for s in (alone, straightened(alone))]
+    alone = FrameFactors([e.evidence for e in frames if e.evidence])
+    furthest = [np.sqrt(s.distances(found.parameters[None])[0] / s.dof).max() for s in (alone, relinearized(alone))]
     assert furthest[0] > 10.0
     assert furthest[1] < 2.0
 
 
 def test_a_known_sensor_needs_no_second_look() -> None:
-    stack = Stack([e.evidence for e in sequence() if e.evidence])
-    assert straightened(stack) is stack
-    assert stack.rays.size == 0
+    factors = FrameFactors([e.evidence for e in sequence() if e.evidence])
+    assert relinearized(factors) is factors
+    assert factors.rays.size == 0
 
 
 def test_the_view_from_elsewhere_takes_any_layout_and_refuses_arrays_that_do_not_belong_together() -> None:
-    stack = Stack([e.evidence for e in sequence(sensor=None) if e.evidence])
-    near = 1e-6 * stack.free
-    given: tuple[Any, ...] = (stack.base, stack.rays, stack.free, stack.base + near)
+    factors = FrameFactors([e.evidence for e in sequence(sensor=None) if e.evidence])
+    near = 1e-6 * factors.free
+    given: tuple[Any, ...] = (
+        factors.linearization_point,
+        factors.rays,
+        factors.free,
+        factors.linearization_point + near,
+    )
     steps, turns = _core.surface_seen_from(*given)
     np.testing.assert_allclose(steps, near, rtol=1e-2, atol=1e-9)
     layouts: list[Callable[[Any], Any]] = [np.asfortranarray, lambda a: np.repeat(a, 2, axis=0)[::2]]
@@ -169,7 +175,9 @@ def test_the_view_from_elsewhere_takes_any_layout_and_refuses_arrays_that_do_not
         np.testing.assert_array_equal(again[0], steps)
         np.testing.assert_array_equal(again[1], turns)
     assert _core.surface_seen_from(*(array[:0] for array in given))[1].shape == (0, 12, 12)
-    nowhere = _core.surface_seen_from(stack.base, stack.rays, stack.free, np.full_like(stack.base, np.nan))
+    nowhere = _core.surface_seen_from(
+        factors.linearization_point, factors.rays, factors.free, np.full_like(factors.linearization_point, np.nan)
+    )
     assert np.isfinite(nowhere[0]).all()
     for k in range(4):
         wrong = [array[1:] if number == k else array for number, array in enumerate(given)]
@@ -222,7 +230,7 @@ def test_continuing_equals_doing_at_once(tmp_path: Path) -> None:
 def test_old_frames_are_added_up_without_loss(monkeypatch: pytest.MonkeyPatch) -> None:
     frames = sequence()
     at_once = calibrate(frames)
-    monkeypatch.setattr(sys.modules["siloscope.calibrate"], "KEPT", 2)
+    monkeypatch.setattr(sys.modules["siloscope.fusion.report"], "MAX_KEPT_FACTORS", 2)
     found = calibrate(frames[4:], continue_from=calibrate(frames[:4]))
     assert len(found.evidence.frames) == 2
     assert found.evidence.earlier is not None
@@ -231,7 +239,7 @@ def test_old_frames_are_added_up_without_loss(monkeypatch: pytest.MonkeyPatch) -
 
 
 def test_frames_since_a_move_stay_used_when_they_are_added_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["siloscope.calibrate"], "KEPT", 2)
+    monkeypatch.setattr(sys.modules["siloscope.fusion.report"], "MAX_KEPT_FACTORS", 2)
     after = [located(scene) for scene in discharge(moved(d_tx=0.01), 5, 0.3, 0.1)]
     found = calibrate(after[4:], continue_from=calibrate([*sequence(), *after[:4]]))
     assert found.moved_at is not None
@@ -335,19 +343,19 @@ def test_the_papers_rule_is_the_mean_of_the_last_ten() -> None:
 def test_what_frames_share_is_bounded_whatever_they_share() -> None:
     draw = np.random.default_rng(5)
     parts = draw.normal(0.0, 1.0, (8, 12)) * 10.0 ** draw.uniform(0.0, 3.0, (8, 1))
-    stack = Stack([e.evidence for e in sequence() if e.evidence])
-    stack.shared = np.einsum("ni,nj->nij", parts, parts)
+    factors = FrameFactors([e.evidence for e in sequence() if e.evidence])
+    factors.shared = np.einsum("ni,nj->nij", parts, parts)
     weights = draw.uniform(0.0, 1.0, 8)
-    total = sums(stack, weights, np.zeros(12))
+    total = summed(factors, weights, np.zeros(12))
     bound = total.weight * total.shared
     together = (weights[:, None] * parts * draw.choice([-1.0, 1.0], (8, 1))).sum(axis=0)
     assert np.linalg.eigvalsh(bound - np.outer(together, together)).min() > -1e-9 * np.trace(bound)
-    assert np.trace(bound) < 0.7 * weights.sum() * np.einsum("n,nii->", weights, stack.shared)
-    stack.shared[:] = stack.shared[0]
-    alike = sums(stack, weights, np.zeros(12))
-    np.testing.assert_allclose(alike.weight * alike.shared, weights.sum() ** 2 * stack.shared[0], rtol=1e-12)
-    before = sums(stack.take(slice(0, 5)), weights[:5], np.zeros(12))
-    after = sums(stack.take(slice(5, 8)), weights[5:], np.zeros(12), before)
+    assert np.trace(bound) < 0.7 * weights.sum() * np.einsum("n,nii->", weights, factors.shared)
+    factors.shared[:] = factors.shared[0]
+    alike = summed(factors, weights, np.zeros(12))
+    np.testing.assert_allclose(alike.weight * alike.shared, weights.sum() ** 2 * factors.shared[0], rtol=1e-12)
+    before = summed(factors.take(slice(0, 5)), weights[:5], np.zeros(12))
+    after = summed(factors.take(slice(5, 8)), weights[5:], np.zeros(12), before)
     np.testing.assert_allclose(after.shared, alike.shared, rtol=1e-12)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from siloscope import Calibration, Estimate, Frame, calibrate, locate
+from siloscope.fusion.schedule import FULL_SEARCH_PERIOD
 from siloscope.simulation import ASTRA_S, Defects, Feed, Scene, discharge
 from siloscope.simulation.scenarios import scenario
 from siloscope.types.pose import SiloPose
@@ -171,7 +172,9 @@ def test_the_jobs_change_nothing() -> None:
 
 
 def test_a_calibration_says_what_its_frames_say_from_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["siloscope.calibrate"], "WHOLE", len(sequence()))  # a quarter says less
+    monkeypatch.setattr(
+        sys.modules["siloscope.fusion.schedule"], "FULL_RES_FRAMES", len(sequence())
+    )  # a quarter says less
     each = [locate(frame, sensor=PROFILE) for frame in sequence()]
     alone, found = calibrate(each), fused(sequence())
     assert [record.status for record in found.frames] == [record.status for record in alone.frames]
@@ -196,5 +199,5 @@ def test_most_frames_are_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     calibrating = sys.modules["siloscope.calibrate"]
     monkeypatch.setattr(calibrating, "locate", watched)
     runs = 2
-    fused([frame(scene) for scene in discharge(SILO3, runs * calibrating.SEARCHED, 0.2, 0.1)])
+    fused([frame(scene) for scene in discharge(SILO3, runs * FULL_SEARCH_PERIOD, 0.2, 0.1)])
     assert searched.count(True) == runs

@@ -179,7 +179,7 @@ def test_equations_are_made_near_the_answer(seed: int, feed: str, level: float) 
     assert found.pose is not None
     assert found.evidence is not None
     pose = [found.pose.r_x, found.pose.r_y, found.pose.t_x, found.pose.t_y]
-    assert (np.abs(pose - found.evidence.base[:4]) < [0.003, 0.003, 0.01, 0.01]).all()
+    assert (np.abs(pose - found.evidence.linearization_point[:4]) < [0.003, 0.003, 0.01, 0.01]).all()
 
 
 def test_a_narrow_band_of_wall_tells_where_the_axis_runs_and_gravity_its_direction() -> None:

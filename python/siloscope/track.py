@@ -11,7 +11,7 @@ from typing import Any
 from siloscope.content import Content
 from siloscope.errors import InputError, UsageError
 from siloscope.io import FrameSource
-from siloscope.io import open as open_frames
+from siloscope.io.given import given_frames
 from siloscope.measure import measure
 from siloscope.tracking.events import events
 from siloscope.tracking.story import Moment
@@ -67,11 +67,11 @@ def track(
     if start is not None and (interval is None or not math.isfinite(start)):
         raise UsageError("start needs an interval: the frames after the first are that many seconds apart")
     silo = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
-    source = open_frames(frames) if _is_path(frames) else frames  # type: ignore[arg-type]
+    source = given_frames(frames)
     clock = _Clock(interval, start)
     moments: list[Moment] = []
     last: Content | None = None
-    for moment, whole in _measured(progress(source) if progress else source, silo, clock, settings):  # type: ignore[arg-type]
+    for moment, whole in _measured(progress(source) if progress else source, silo, clock, settings):
         moments.append(moment)
         last = whole if whole.ok else last
     problems = tuple(source.problems) if isinstance(source, FrameSource) else ()
@@ -92,12 +92,6 @@ class _Clock:
         if own is not None or self.interval is None:
             return own
         return (self.start or 0.0) + index * self.interval
-
-
-def _is_path(frames: Any) -> bool:
-    if isinstance(frames, str | PathLike):
-        return True
-    return isinstance(frames, list | tuple) and bool(frames) and all(isinstance(f, str | PathLike) for f in frames)
 
 
 def _measured(

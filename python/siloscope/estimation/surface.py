@@ -16,7 +16,7 @@ from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate, Ratios, SurfaceDetails
 from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
-from siloscope.types.vessel import SiloGeometry
+from siloscope.types.vessel import geometry_of
 
 OVALITY = PARAMETERS.index("oval_cos")
 
@@ -148,7 +148,7 @@ def _estimate(
 ) -> Estimate:
     pose = SiloPose(*found["pose"])
     covariance = found["covariance"]
-    silo, silo_std = geometry(found["radius"], found["cone"], covariance)
+    silo, silo_std = geometry_of(found["radius"], found["cone"], covariance)
     extra = {"sensor": _sensor(found, profile), "fit": _quality(found)}
     if gravity is not None:
         extra["gravity"] = _gravity_check(pose, gravity)
@@ -167,28 +167,6 @@ def _estimate(
         evidence=_evidence(found, profile, diameter, gravity),
         details=SurfaceDetails(found["points"], found["residuals"], found["wall"], labelled),
     )
-
-
-def geometry(
-    radius: float | None, cone: tuple[float, float] | None, covariance: NDArray[np.float64]
-) -> tuple[SiloGeometry, SiloGeometry]:
-    """Geometry and its standard deviations from radius R, cone slope m and intercept b; the cone has radius b − m·z."""
-    std = np.sqrt(np.diag(covariance))
-    r_std = None if radius is None else float(std[4])
-    if cone is None:
-        return SiloGeometry(radius=radius), SiloGeometry(radius=r_std)
-    slope, intercept = cone
-
-    def height(radius: float, by_radius: float) -> tuple[float, float]:
-        z = (intercept - radius) / slope
-        jacobian = np.array([by_radius, -z, 1.0]) / slope
-        return z, float(np.sqrt(jacobian @ covariance[4:7, 4:7] @ jacobian))
-
-    apex, apex_std = height(0.0, 0.0)
-    if radius is None:
-        return SiloGeometry(apex=apex), SiloGeometry(apex=apex_std)
-    bottom, bottom_std = height(radius, -1.0)
-    return SiloGeometry(radius, bottom, apex), SiloGeometry(r_std, bottom_std, apex_std)
 
 
 def _ratios(counts: Any) -> Ratios | None:
@@ -259,6 +237,6 @@ def _evidence(
         prior_mean=expected,
         prior_information=prior,
         scale_std=0.0 if free[8] else profile.bias_std[1],
-        base=found["base"],
+        linearization_point=found["base"],
         rays=found["rays"],
     )

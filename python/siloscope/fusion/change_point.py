@@ -5,27 +5,28 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.fusion.solve import BIAS, FAR, RADIUS, SCALE, Fused, Stack, deviation, fuse, majority, sums
+from siloscope.fusion.factors import BIAS, RADIUS, SCALE, FrameFactors
+from siloscope.fusion.solve import MAX_SIGMAS, Fused, deviation, fuse, least_trimmed_squares, summed
 from siloscope.parameters import SIZE
 from siloscope.types.frame_factor import SummedFactor
 from siloscope.types.move import Move
 
-SHORTEST = 3
+MIN_FRAMES = 3
 """A move needs this many agreeing frames on both sides; fewer are bad frames."""
 
-SIGNIFICANT = 50.0
+CHI2_MOVE = 50.0
 """Least squared distance between the poses before and after, for 4 degrees of freedom (chance: 4e-10)."""
 
-SMALLEST_TURN = 5e-4
+MIN_TURN = 5e-4
 """Turns below this are not worth telling, rad."""
 
-SMALLEST_SHIFT = 1e-3
+MIN_SHIFT = 1e-3
 """Shifts below this are not worth telling, m."""
 
 FEW_STARTS = 4
 """Starts of the robust fits while looking for the place."""
 
-GRID = 16
+PLACES = 16
 """Places tried at a time."""
 
 MOVING = (0, 1, 2, 3, 6, 10, 11)
@@ -36,81 +37,85 @@ STAYING = (4, 5, 7, 8, 9)
 """Parameters that it does not: radius, cone slope, depth bias."""
 
 
-def find_moves(stack: Stack, earlier: SummedFactor | None = None, first: int = 0) -> list[Move]:
+def find_moves(factors: FrameFactors, earlier: SummedFactor | None = None, first: int = 0) -> list[Move]:
     """All moves in the sequence, in order; `earlier` frames stand before it."""
     known = 0 if earlier is None else earlier.frames
-    if stack.count < SHORTEST or known + stack.count < 2 * SHORTEST:
+    if factors.count < MIN_FRAMES or known + factors.count < 2 * MIN_FRAMES:
         return []
-    split = _best_split(stack, earlier)
-    move = None if split is None else _judged(stack, earlier, split, first)
+    split = _best_split(factors, earlier)
+    move = None if split is None else _judged(factors, earlier, split, first)
     if move is None:
         return []
     place = move.index - first
-    before, after = stack.take(slice(0, place)), stack.take(slice(place, None))
+    before, after = factors.take(slice(0, place)), factors.take(slice(place, None))
     return [*find_moves(before, earlier, first), move, *find_moves(after, None, move.index)]
 
 
 def may_have_moved(fused: Fused) -> bool:
     """Whether as many frames as a move needs were left out one after the other."""
     left_out = fused.weights < 0.5
-    return any(left_out[first : first + SHORTEST].all() for first in range(len(left_out) - SHORTEST + 1))
+    return any(left_out[first : first + MIN_FRAMES].all() for first in range(len(left_out) - MIN_FRAMES + 1))
 
 
-def _best_split(stack: Stack, earlier: SummedFactor | None) -> int | None:
+def _best_split(factors: FrameFactors, earlier: SummedFactor | None) -> int | None:
     """Where cutting the sequence in two leaves the smallest robust misfit; coarse to fine."""
-    least = SHORTEST if earlier is None or earlier.frames < SHORTEST else 0
-    low, high = least, stack.count - SHORTEST
+    least = MIN_FRAMES if earlier is None or earlier.frames < MIN_FRAMES else 0
+    low, high = least, factors.count - MIN_FRAMES
     if high < low:
         return None
     while True:
-        places = np.unique(np.linspace(low, high, GRID).round().astype(int))
-        costs = _misfits(stack, places, True, earlier) + _misfits(stack, places, False, None)
+        places = np.unique(np.linspace(low, high, PLACES).round().astype(int))
+        costs = _misfits(factors, places, True, earlier) + _misfits(factors, places, False, None)
         best = int(places[costs.argmin()])
         step = int(np.diff(places).max()) if len(places) > 1 else 1
         if step <= 1:
             return best
-        low, high = max(least, best - step), min(stack.count - SHORTEST, best + step)
+        low, high = max(least, best - step), min(factors.count - MIN_FRAMES, best + step)
 
 
-def _misfits(stack: Stack, places: NDArray[np.int_], before: bool, base: SummedFactor | None) -> NDArray[np.float64]:
+def _misfits(
+    factors: FrameFactors, places: NDArray[np.int_], before: bool, base: SummedFactor | None
+) -> NDArray[np.float64]:
     """Robust misfit of the frames before or after each place about their own answer."""
     first = np.zeros_like(places) if before else places
-    last = places if before else np.full_like(places, stack.count)
-    number = np.arange(stack.count)
+    last = places if before else np.full_like(places, factors.count)
+    number = np.arange(factors.count)
     members = (number >= first[:, None]) & (number < last[:, None])
     starts = np.linspace(first, np.maximum(last - 1, first), FEW_STARTS, axis=1).round().astype(np.intp)
-    centres = majority(stack, members, np.minimum(starts, stack.count - 1), base or SummedFactor.nothing())
-    off = np.clip(deviation(stack.distances(centres), stack.dof), 0.0, FAR)
+    centres = least_trimmed_squares(
+        factors, members, np.minimum(starts, factors.count - 1), base or SummedFactor.nothing()
+    )
+    off = np.clip(deviation(factors.distances(centres), factors.dof), 0.0, MAX_SIGMAS)
     misfits: NDArray[np.float64] = np.where(members, off**2, 0.0).sum(axis=1)
     return misfits
 
 
-def _judged(stack: Stack, earlier: SummedFactor | None, split: int, first: int) -> Move | None:
+def _judged(factors: FrameFactors, earlier: SummedFactor | None, split: int, first: int) -> Move | None:
     """The move at a place, if both sides agree within themselves and not with each other."""
-    before, after = stack.take(slice(0, split)), stack.take(slice(split, None))
+    before, after = factors.take(slice(0, split)), factors.take(slice(split, None))
     sides = [fuse(before, earlier) if before.count else None, fuse(after)]
     counts = [_agreeing(sides[0], earlier), _agreeing(sides[1], None)]
-    if min(counts) < SHORTEST:
+    if min(counts) < MIN_FRAMES:
         return None
     totals = [_side(before, sides[0], earlier), _side(after, sides[1], None)]
     step, distance = _contrast(totals, max(side.excess for side in sides if side is not None))
     turn, shift = float(np.hypot(*step[:2])), float(np.hypot(*step[2:4]))
-    worth = turn > SMALLEST_TURN or shift > SMALLEST_SHIFT
-    index = first + _placed(stack, split, sides)
-    return Move(index, turn, shift, distance) if worth and distance > SIGNIFICANT else None
+    worth = turn > MIN_TURN or shift > MIN_SHIFT
+    index = first + _placed(factors, split, sides)
+    return Move(index, turn, shift, distance) if worth and distance > CHI2_MOVE else None
 
 
-def _placed(stack: Stack, split: int, sides: list[Fused | None]) -> int:
+def _placed(factors: FrameFactors, split: int, sides: list[Fused | None]) -> int:
     """The place, with bad frames beside it on the side whose pose is nearer: they cost the same on both."""
     before, after = sides
     if before is None or after is None:
         return split
     bad = np.concatenate([before.weights, after.weights]) < 0.5
     poses = np.where(np.arange(SIZE) < RADIUS, [before.parameters, after.parameters], np.nan)
-    to_before, to_after = stack.distances(poses)
+    to_before, to_after = factors.distances(poses)
     while split > 0 and bad[split - 1] and to_after[split - 1] < to_before[split - 1]:
         split -= 1
-    while split < stack.count and bad[split] and to_before[split] < to_after[split]:
+    while split < factors.count and bad[split] and to_before[split] < to_after[split]:
         split += 1
     return split
 
@@ -120,10 +125,10 @@ def _agreeing(side: Fused | None, earlier: SummedFactor | None) -> int:
     return known + (0 if side is None else int((side.weights > 0.5).sum()))
 
 
-def _side(part: Stack, fused: Fused | None, base: SummedFactor | None) -> SummedFactor:
+def _side(part: FrameFactors, fused: Fused | None, base: SummedFactor | None) -> SummedFactor:
     if fused is None:
         return base or SummedFactor.nothing()
-    return sums(part, fused.weights, fused.parameters, base)
+    return summed(part, fused.weights, fused.parameters, base)
 
 
 def _contrast(sides: list[SummedFactor], excess: float) -> tuple[NDArray[np.float64], float]:

@@ -179,13 +179,13 @@ class Factor(Document):
     prior_mean: Nullable
     prior_information: Nullable
     scale_std: NotNegative
-    base: Nullable
+    linearization_point: Nullable = Field(alias="base")
     rays: Annotated[Array, PlainValidator(_rays)]
 
     @model_validator(mode="after")
     def _estimated(self) -> Factor:
-        for name in ("parameters", "base"):
-            if not np.isfinite(getattr(self, name)[self.free]).all():
+        for name, values in (("parameters", self.parameters), ("base", self.linearization_point)):
+            if not np.isfinite(values[self.free]).all():
                 raise wrong("lacks a value that was estimated", name)
         return self
 

@@ -42,7 +42,7 @@ class FrameFactor:
     """How firmly, as 1/variance; 0 where nothing was expected."""
     scale_std: float
     """Standard deviation of the depth scale where no frame can tell it, else 0."""
-    base: NDArray[np.float64]
+    linearization_point: NDArray[np.float64]
     """Where the frame's equations were made, near `parameters`; NaN where they are."""
     rays: NDArray[np.float64]
     """(K, 3): (x, y) of rays (x, y, 1) to some of the wall that was seen, and their information, 1/m². None where the
@@ -52,6 +52,7 @@ class FrameFactor:
         """Plain data; of symmetric matrices only the upper triangle, row by row."""
         return {
             **{name: nullable(getattr(self, name)) for name in _VECTORS},
+            "base": nullable(self.linearization_point),
             **{name: _triangle(getattr(self, name)) for name in _MATRICES},
             "free": [bool(f) for f in self.free],
             "rays": self.rays.tolist(),
@@ -94,7 +95,7 @@ class SummedFactor:
 
 
 _UPPER = np.triu_indices(SIZE)
-_VECTORS = ("parameters", "gradient", "prior_mean", "prior_information", "base")
+_VECTORS = ("parameters", "gradient", "prior_mean", "prior_information")
 _MATRICES = ("information", "scatter", "noise")
 _SUM_VECTORS = ("origin", "pull", "prior_information", "prior_mean")
 _SUM_MATRICES = ("information", "noise", "shared")

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 @dataclass(frozen=True)
 class SiloGeometry:
@@ -50,3 +53,25 @@ def to_plain(lengths: Lengths) -> dict[str, Any]:
     """Plain data for a result's ``silo``."""
     geometry = SiloGeometry(apex=lengths.geometry.apex) if lengths.cone_only else lengths.geometry
     return {**geometry.to_dict(), "top": lengths.top, "top_from": lengths.top_from}
+
+
+def geometry_of(
+    radius: float | None, cone: tuple[float, float] | None, covariance: NDArray[np.float64]
+) -> tuple[SiloGeometry, SiloGeometry]:
+    """Geometry and its standard deviations from radius R, cone slope m and intercept b; the cone has radius b − m·z."""
+    std = np.sqrt(np.diag(covariance))
+    r_std = None if radius is None else float(std[4])
+    if cone is None:
+        return SiloGeometry(radius=radius), SiloGeometry(radius=r_std)
+    slope, intercept = cone
+
+    def height(radius: float, by_radius: float) -> tuple[float, float]:
+        z = (intercept - radius) / slope
+        jacobian = np.array([by_radius, -z, 1.0]) / slope
+        return z, float(np.sqrt(jacobian @ covariance[4:7, 4:7] @ jacobian))
+
+    apex, apex_std = height(0.0, 0.0)
+    if radius is None:
+        return SiloGeometry(apex=apex), SiloGeometry(apex=apex_std)
+    bottom, bottom_std = height(radius, -1.0)
+    return SiloGeometry(radius, bottom, apex), SiloGeometry(r_std, bottom_std, apex_std)

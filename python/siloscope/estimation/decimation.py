@@ -15,14 +15,14 @@ STEP = 2
 """Rows and columns from one pixel that is kept to the next."""
 
 LEAST = 640
-"""Columns of the smallest image that is thinned: half as many still show where wall ends and feed begins."""
+"""Columns of the smallest image that is decimated: half as many still show where wall ends and feed begins."""
 
 
-def thinned(data: Any, camera: Camera | None) -> Frame | None:
+def decimated(data: Any, camera: Camera | None) -> Frame | None:
     """Every second row and column of a depth image, with the camera that sees just these.
 
     `data` is a frame, or an array of depth (H, W), whose camera is `camera` where that is given. None where there is
-    nothing to thin: points, a small image, or one whose camera is not known or of another size.
+    nothing to decimate: points, a small image, or one whose camera is not known or of another size.
     """
     frame = data if isinstance(data, Frame) else Frame(depth=data) if type(data) is np.ndarray else Frame()
     camera = camera or frame.camera
@@ -30,11 +30,11 @@ def thinned(data: Any, camera: Camera | None) -> Frame | None:
         return None
     if frame.depth.shape != (camera.height, camera.width):
         return None
-    return replace(frame, depth=np.ascontiguousarray(frame.depth[::STEP, ::STEP]), camera=_thinned_camera(camera))
+    return replace(frame, depth=np.ascontiguousarray(frame.depth[::STEP, ::STEP]), camera=decimated_camera(camera))
 
 
 @lru_cache(maxsize=4)
-def _thinned_camera(camera: Camera) -> Camera:
+def decimated_camera(camera: Camera) -> Camera:
     return replace(
         camera,
         width=-(-camera.width // STEP),

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from siloscope import Calibration, Camera, Estimate, Frame, calibrate, locate
-from siloscope.estimation.thinning import STEP, thinned
+from siloscope.estimation.decimation import STEP, decimated
 from siloscope.simulation import ASTRA_S, Feed, Scene, discharge
 from siloscope.simulation.scenarios import scenario
 
@@ -29,7 +29,7 @@ def frame(scene: Scene) -> Frame:
 def test_the_thinned_camera_sees_every_second_ray(size: tuple[int, int]) -> None:
     camera = Camera(*size, 525.0, 520.0, 317.3, 241.1, "brown_conrady", (0.02, -0.01, 0.001, 0.002, 0.003))
     depth = np.random.default_rng(1).uniform(1.0, 2.0, (size[1], size[0]))
-    few = thinned(Frame(depth=depth, camera=camera, depth_unit=0.5, source="here"), None)
+    few = decimated(Frame(depth=depth, camera=camera, depth_unit=0.5, source="here"), None)
     assert few is not None
     assert few.camera is not None
     np.testing.assert_array_equal(few.depth, depth[::STEP, ::STEP])
@@ -40,28 +40,28 @@ def test_the_thinned_camera_sees_every_second_ray(size: tuple[int, int]) -> None
 def test_an_array_is_thinned_with_the_camera_that_is_given() -> None:
     seen = frame(SILO3)
     assert seen.depth is not None
-    few, same = thinned(seen.depth, seen.camera), thinned(seen, None)
+    few, same = decimated(seen.depth, seen.camera), decimated(seen, None)
     assert few is not None
     assert same is not None
     assert few.camera == same.camera
     np.testing.assert_array_equal(few.depth, same.depth)
 
 
-def test_what_can_not_be_thinned() -> None:
+def test_what_can_not_be_decimated() -> None:
     camera = Camera(320, 240, 260.0, 260.0, 160.0, 120.0)
     wide = replace(camera, width=640, height=480)
-    assert thinned(np.ones((480, 640)), None) is None
-    assert thinned(Frame(depth=np.ones((240, 320)), camera=camera), None) is None
-    assert thinned(Frame(depth=np.ones((240, 320)), camera=wide), None) is None
-    assert thinned(Frame(points=np.ones((9, 3))), wide) is None
-    assert thinned("frame.png", wide) is None
+    assert decimated(np.ones((480, 640)), None) is None
+    assert decimated(Frame(depth=np.ones((240, 320)), camera=camera), None) is None
+    assert decimated(Frame(depth=np.ones((240, 320)), camera=wide), None) is None
+    assert decimated(Frame(points=np.ones((9, 3))), wide) is None
+    assert decimated("frame.png", wide) is None
 
 
 @pytest.mark.parametrize("known", [{"sensor": PROFILE}, {"diameter": 3.0}])
 def test_a_quarter_of_the_pixels_says_the_same_with_twice_the_deviation(known: dict[str, Any]) -> None:
     ratios = []
     for scene in discharge(SILO3, 6, 0.4, 0.05):
-        few = thinned(frame(scene), None)
+        few = decimated(frame(scene), None)
         assert few is not None
         one, other = locate(frame(scene), **known), locate(few, **known)
         assert one.covariance is not None
@@ -93,7 +93,7 @@ def asked(monkeypatch: pytest.MonkeyPatch, whole: int, **settings: Any) -> tuple
     module = sys.modules["siloscope.calibrate"]
     with monkeypatch.context() as patch:
         patch.setattr(module, "locate", watched)
-        patch.setattr(module, "WHOLE", whole)
+        patch.setattr(sys.modules["siloscope.fusion.schedule"], "FULL_RES_FRAMES", whole)
         return calibrate(sequence(), sensor=PROFILE, **settings), looks
 
 

@@ -1,0 +1,22 @@
+"""A frame of a calibration that has been located."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from siloscope.errors import InputError
+from siloscope.types.camera import Camera
+from siloscope.types.estimate import Estimate
+
+
+@dataclass(frozen=True)
+class LocatedFrame:
+    """One frame's estimate, or why there is none."""
+
+    name: str
+    timestamp: float | None
+    estimate: Estimate | None
+    error: InputError | None = None
+    camera: Camera | None = None
+    made: bool = True
+    """Whether it was made here; False for an estimate that the caller brought."""

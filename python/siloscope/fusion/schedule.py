@@ -1,0 +1,118 @@
+"""Which frame is located when, from where, and with how many of its pixels; the answers in the frames' order."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Executor, Future
+from dataclasses import dataclass, replace
+from typing import Any
+
+from siloscope.errors import InputError
+from siloscope.estimation.decimation import decimated
+from siloscope.fusion.located_frame import LocatedFrame
+from siloscope.fusion.settings import Settings
+from siloscope.types.camera import Camera
+from siloscope.types.estimate import Estimate
+from siloscope.types.frame import Frame
+
+FULL_SEARCH_PERIOD = 16
+"""Frames from one that is searched for the wall to the next; the others look first where such a frame has shown it."""
+
+FULL_RES_FRAMES = 16
+"""Frames at the beginning that count with all their pixels. Later ones add little and count with a quarter of them."""
+
+
+Located = tuple[LocatedFrame, Estimate | None]
+"""A frame's answer, and the estimate from which others may start."""
+
+
+@dataclass(frozen=True)
+class FrameLocator:
+    """Locates the frames of a calibration, each by itself."""
+
+    locate: Callable[..., Estimate]
+    camera: Camera | None
+    depth_unit: float | None
+    settings: Settings
+
+    def __call__(self, number: int, frame: Any, start: Estimate | None) -> Located:
+        """The answer of the frame of a number, looked for first where `start` has the wall."""
+        if isinstance(frame, Estimate):
+            return LocatedFrame(f"estimate {number}", None, frame, made=False), None
+        name = frame.source if isinstance(frame, Frame) else f"frame {number}"
+        timestamp = frame.timestamp if isinstance(frame, Frame) else None
+        try:
+            estimate = self._estimate(number, frame, start)
+        except InputError as error:
+            return LocatedFrame(name, timestamp, None, error), None
+        camera = self.camera or (frame.camera if isinstance(frame, Frame) else None)
+        return LocatedFrame(name, timestamp, replace(estimate, details=None), camera=camera), estimate
+
+    def _estimate(self, number: int, frame: Any, start: Estimate | None) -> Estimate:
+        common, unit = self.settings, self.depth_unit
+        known: dict[str, Any] = {"diameter": common.diameter, "gravity": common.gravity, "depth_unit": unit}
+        known |= {"sensor": common.profile, "start": start, "ratios": False}
+        few = self._decimated(frame, known) if number >= FULL_RES_FRAMES else None
+        return few or self.locate(frame, self.camera, **known)
+
+    def _decimated(self, frame: Any, known: dict[str, Any]) -> Estimate | None:
+        """The answer of a quarter of a frame's pixels, where they give one."""
+        few = decimated(frame, self.camera)
+        try:
+            estimate = None if few is None else self.locate(few, **known)
+        except InputError:  # all the pixels tell better what is wrong
+            return None
+        return estimate if estimate is not None and estimate.ok else None
+
+
+def located(frames: Iterable[Any], one: FrameLocator, pool: Executor, ahead: int) -> Iterator[LocatedFrame]:
+    """The frames located in order; the next ones are read and located in `pool`, so many `ahead`.
+
+    Which frame starts from which answer is settled by their order alone, so that the pool doesn't change any answer.
+    """
+    waiting: deque[Future[Located]] = deque()
+    starts = WarmStartSchedule()
+    for number, frame in enumerate(frames):
+        waiting.append(pool.submit(one, number, frame, starts.of(number)))
+        starts.add(number, waiting[-1])
+        if len(waiting) > ahead:
+            yield waiting.popleft().result()[0]
+    while waiting:
+        yield waiting.popleft().result()[0]
+
+
+class WarmStartSchedule:
+    """Where frames start: a searched one from nothing, the others from the last but one that was searched.
+
+    The last one may still be at work; only the first frames that are asked whole, or for a quarter, wait for it.
+    """
+
+    def __init__(self) -> None:
+        self.searched: deque[Future[Located]] = deque()
+        self.start: Estimate | None = None
+
+    def of(self, number: int) -> Estimate | None:
+        """Where the frame of a number starts."""
+        if number % FULL_SEARCH_PERIOD == 0:
+            return None
+        first = any(0 <= number - begin < FULL_SEARCH_PERIOD for begin in (0, FULL_RES_FRAMES))
+        while len(self.searched) > (0 if first else 1):
+            found = self.searched.popleft().result()[1]
+            self.start = found if found is not None and found.ok else self.start
+        return self.start
+
+    def add(self, number: int, answer: Future[Located]) -> None:
+        """Takes the answer of a frame that will be one to start from."""
+        if number % FULL_SEARCH_PERIOD == 0:
+            self.searched.append(answer)
+
+
+class Inline(Executor):
+    """Does the work at once, in this thread."""
+
+    def submit(self, work: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+        """The work, done."""
+        done: Future[Any] = Future()
+        done.set_result(work(*given, **named))
+        return done
