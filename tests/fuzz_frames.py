@@ -29,6 +29,7 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
 
+import camera_texts
 import frame_files
 import recording_files
 import siloscope
@@ -58,6 +59,8 @@ SEEDS: dict[str, Callable[[], bytes]] = {
     **{name: _first_lines(name, count) for name, count in _SHORT.items()},
     **recording_files.MAKERS,
     **{f"camera{suffix}": _camera_file(suffix) for suffix in (".json", ".toml", ".yaml")},
+    **{f"camera, {name}": text.encode for name, text in (camera_texts.PLAIN | camera_texts.LENSES).items()},
+    "camera, Kalibr": camera_texts.KALIBR.encode,
 }
 """Good files by name, the text tables short."""
 

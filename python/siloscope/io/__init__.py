@@ -13,6 +13,7 @@ from os import PathLike
 from pathlib import Path
 
 from siloscope.errors import InputError, UsageError
+from siloscope.io.camera_files.sizes import Known
 from siloscope.io.chain import Chain, Unreadable
 from siloscope.io.source import HEAD_BYTES, Format, FrameSource, Item, Options
 from siloscope.types.camera import Camera
@@ -149,7 +150,7 @@ def _head(path: Path) -> bytes:
     return head
 
 
-def _cameras(camera: Camera | StrPath | None) -> tuple[tuple[Camera, ...], float | None]:
+def _cameras(camera: Camera | StrPath | None) -> tuple[tuple[Known, ...], float | None]:
     """The cameras that the user gives, and the depth unit in their file."""
     if camera is None or isinstance(camera, Camera):
         return () if camera is None else (camera,), None

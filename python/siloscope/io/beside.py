@@ -10,6 +10,7 @@ from siloscope.io.source import FrameSource
 
 NAMES = (
     *(f"camera{suffix}" for suffix in (".json", ".toml", ".yaml", ".yml", ".txt")),
+    *("camera_matrix.csv", "camera-intrinsics.txt", "intrinsic_depth.txt", "scene_camera.json"),
     *(f"camera_info{suffix}" for suffix in (".yaml", ".yml", ".json")),
     *("camera_intrinsic.json", "camera_intrinsics.json", "intrinsic.json"),
     *(f"intrinsics{suffix}" for suffix in (".json", ".toml", ".yaml", ".yml", ".txt")),
@@ -36,8 +37,8 @@ def take_camera_beside(source: FrameSource, size: tuple[int, int], *folders: Pat
     if path is None:
         return
     stored = camera_files.read(path)
-    source.file_camera = stored.cameras[0] if len(stored.cameras) == 1 else camera_files.load(path, size)
-    source.provenance["camera_from"] = path.name
+    source.file_camera, how = camera_files.choose(str(path), stored.cameras, size)
+    source.provenance["camera_from"] = f"{path.name}, {how}" if how else path.name
     if stored.depth_unit is not None:
         source.file_depth_unit = stored.depth_unit
         source.provenance["depth_unit_from"] = path.name

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.errors import InputError
+from siloscope.io.camera_files.sizes import choose
 from siloscope.io.terms import Options as Options
 from siloscope.io.terms import UnknownUnit, finish
 from siloscope.types.camera import Camera
@@ -131,8 +132,20 @@ class FrameSource(ABC):
     @property
     def camera(self) -> Camera | None:
         """The user's camera, else the file's, else None."""
-        given = self.options.cameras
-        return given[0] if len(given) == 1 else self.file_camera
+        given, size = self.options.cameras, self._stream_size()
+        if not given or (len(given) > 1 and size is None):
+            return self.file_camera
+        if size is None:
+            return given[0] if isinstance(given[0], Camera) else None
+        try:
+            return choose(self.name, given, size)[0]
+        except InputError:
+            return given[0] if isinstance(given[0], Camera) else None  # refused, with the reason, for every frame
+
+    def _stream_size(self) -> tuple[int, int] | None:
+        """Width and height of the chosen stream's images, or None for points in no order."""
+        sizes: list[Any] = [stream.get("size") or () for stream in self._streams() if stream.get("chosen")]
+        return (sizes[0][0], sizes[0][1]) if sizes and len(sizes[0]) == 2 else None
 
     @property
     def depth_unit(self) -> float | None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.errors import InputError
-from siloscope.types.camera import Camera
+from siloscope.io.camera_files.sizes import Known, choose
 from siloscope.types.frame import Frame
 
 FARTHEST_M = 100.0
@@ -30,8 +30,9 @@ class Options:
 
     Attributes
     ----------
-    cameras : tuple of Camera
-        Empty, or the user's camera; several where their file lists a resolution each (the frame's size chooses).
+    cameras : tuple of Camera or Intrinsics
+        Empty, or the user's camera; several where their file lists a resolution each. The frame's size chooses, and
+        scales what it is an exact ratio of.
     depth_unit : float or None
         Metres per raw unit. It also scales floating-point depth and points, unless they are metres already.
     camera_depth_unit : float or None
@@ -44,7 +45,7 @@ class Options:
         Whether to take the camera from a file beside the frame, where the format has no place for one.
     """
 
-    cameras: tuple[Camera, ...] = ()
+    cameras: tuple[Known, ...] = ()
     depth_unit: float | None = None
     camera_depth_unit: float | None = None
     stream: str | None = None
@@ -164,18 +165,20 @@ def _as_uint16(depth: NDArray[Any]) -> NDArray[np.uint16] | None:
     return np.maximum(depth, 0).astype(np.uint16) if depth.max(initial=0) <= 65_535 else None
 
 
-def _with_camera(frame: Frame, given: tuple[Camera, ...]) -> Frame:
+def _with_camera(frame: Frame, given: tuple[Known, ...]) -> Frame:
     size = _size(frame)
-    camera = frame.camera if not given or size is None else _of_size(given, size, frame.source)
-    if camera is None or size is None:
+    if size is None:
         return frame
-    if (camera.width, camera.height) != size:
+    if given:
+        camera, how = choose(frame.source, given, size)
+        frame = _with_origin(frame, camera_from=f"given, {how}" if how else "given")
+        return replace(frame, camera=camera)
+    if frame.camera is not None and (frame.camera.width, frame.camera.height) != size:
         raise InputError(
             f"{frame.source}: the frame is {size[0]} x {size[1]} pixels but the camera "
-            f"{camera.width} x {camera.height}; give the camera of this stream with --camera"
+            f"{frame.camera.width} x {frame.camera.height}; give the camera of this stream with --camera"
         )
-    frame = _with_origin(frame, camera_from="given") if given else frame
-    return replace(frame, camera=camera)
+    return frame
 
 
 def _size(frame: Frame) -> tuple[int, int] | None:
@@ -185,18 +188,6 @@ def _size(frame: Frame) -> tuple[int, int] | None:
     if frame.points is not None and frame.points.ndim == 3:
         return frame.points.shape[1], frame.points.shape[0]
     return None
-
-
-def _of_size(cameras: tuple[Camera, ...], size: tuple[int, int], source: str) -> Camera:
-    fitting = [camera for camera in cameras if (camera.width, camera.height) == size]
-    if len(fitting) > 1:
-        raise InputError(f"{source}: the camera file has {len(fitting)} different cameras of this size; keep the one")
-    if fitting:
-        return fitting[0]
-    if len(cameras) == 1:
-        return cameras[0]
-    known = ", ".join(f"{camera.width} x {camera.height}" for camera in cameras)
-    raise InputError(f"{source}: the frame is {size[0]} x {size[1]} pixels, the camera file has {known}")
 
 
 def _z_from_ray_length(frame: Frame) -> Frame:

@@ -89,7 +89,7 @@ class NpzSource(ArraySource):
         if text is not None and text.dtype.kind == "U" and text.size == 1:
             stored = camera_files.parse_json(f"{self.name}: camera", str(text.reshape(-1)[0]))
             self.file_depth_unit = stored.depth_unit
-            return stored.cameras[0]
+            return camera_files.choose(f"{self.name}: camera", stored.cameras, self.image_size)[0]
         matrix = self._beside("K")
         if matrix is None or self.kind == "points":
             return None

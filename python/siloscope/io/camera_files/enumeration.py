@@ -6,7 +6,7 @@ import re
 from typing import Any
 
 from siloscope.errors import InputError
-from siloscope.io.camera_files.fields import from_fields
+from siloscope.io.camera_files.fields import from_fields, sized
 from siloscope.types.camera import Camera
 
 
@@ -30,7 +30,7 @@ def _from_block(name: str, block: str) -> Camera:
         key: _parsed(words[key]) for key in ("width", "height", "ppx", "ppy", "fx", "fy") if key in words
     }
     fields |= {"model": words.get("distortion", ""), "coeffs": [_parsed(k) for k in words.get("coeffs", "").split()]}
-    return from_fields(name, fields).cameras[0]
+    return sized(name, from_fields(name, fields).cameras[0])
 
 
 def _parsed(word: str) -> float | str:

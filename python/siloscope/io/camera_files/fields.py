@@ -11,6 +11,8 @@ import numpy as np
 
 from siloscope.errors import InputError
 from siloscope.io.camera_files.distortion import distortion_model, is_fisheye
+from siloscope.io.camera_files.sizes import Intrinsics, Known
+from siloscope.io.camera_files.tables import bop_unit
 from siloscope.types.camera import Camera
 
 _FIELD_NAMES = {
@@ -21,9 +23,11 @@ _FIELD_NAMES = {
     "cx": ("cx", "ppx"),
     "cy": ("cy", "ppy"),
 }
-_MATRIX_NAMES = ("camera_matrix", "K", "k")
+_MATRIX_NAMES = ("camera_matrix", "K", "cam_K", "camera_mat", "mtx", "intrinsic_matrix")
 _MODEL_NAMES = ("distortion_model", "model", "camera_model")
-_COEFFICIENT_NAMES = ("distortion_coefficients", "distortion", "coeffs", "coefficients", "D", "d")
+_OPENCV_COEFFICIENTS = ("distortion_coefficients", "dist", "dist_coeffs", "dist_coeff")
+"""Coefficients that name no model are OpenCV's under these names: plumb_bob up to five of them, rational above."""
+_COEFFICIENT_NAMES = (*_OPENCV_COEFFICIENTS, "distortion", "coeffs", "coefficients", "D")
 _NESTED_NAMES = ("camera", "depth", "depth_camera", "depth_intrinsics", "intrinsic", "intrinsics")
 
 
@@ -33,50 +37,76 @@ class CameraFile:
 
     Attributes
     ----------
-    cameras : tuple of Camera
-        One, or one a resolution.
+    cameras : tuple of Camera or Intrinsics
+        One, or several of which the frame's size chooses; `Intrinsics` where they hold for more sizes than one.
     depth_unit : float or None
         Metres per raw unit, where the file has it.
     """
 
-    cameras: tuple[Camera, ...]
+    cameras: tuple[Known, ...]
     depth_unit: float | None = None
 
 
-def from_fields(name: str, fields: Any) -> CameraFile:
-    """The camera and unit in named fields, as a camera file has them; raises `InputError` naming the field."""
+def from_fields(name: str, fields: Any, *, calibration: bool = False) -> CameraFile:
+    """The camera and unit in named fields, as a camera file has them; raises `InputError` naming the field.
+
+    The intrinsics of a `calibration` hold for its images at any scale, those of other files for one size.
+    """
     if not isinstance(fields, Mapping):
         raise InputError(f"{name}: no named fields; a camera file has width, height, fx, fy, cx, cy")
     nested = [fields[key] for key in _NESTED_NAMES if isinstance(fields.get(key), Mapping)]
     inner = nested[0] if nested and not _has_focal_length(fields) else fields
     _refuse_crops(name, inner)
-    values = {key: _number(name, key, _field(name, inner, key)) for key in ("width", "height")}
-    values |= _focal_lengths(name, inner)
+    values = _size(name, inner) | _focal_lengths(name, inner)
     named = next((inner[key] for key in _MODEL_NAMES if isinstance(inner.get(key), str)), "")
-    k = _coefficients(name, inner, fisheye=is_fisheye(named))
+    if not named and inner.get("fisheye_model") in (1, "1"):
+        named = "fisheye"
+    named, k = _lens(name, inner, named)
     model = distortion_model(name, named, k)
-    unit = depth_unit_of(name, inner) or depth_unit_of(name, fields)
-    return CameraFile((_camera(name, values, model, k),), unit)
+    unit = bop_unit(fields) or depth_unit_of(name, inner) or depth_unit_of(name, fields)
+    return CameraFile((_camera(name, values, model, k, calibration),), unit)
 
 
-def _camera(name: str, values: dict[str, float], model: str, k: list[float]) -> Camera:
+def _size(name: str, fields: Mapping[str, Any]) -> dict[str, float]:
+    """Width and height; neither where the file has all of the intrinsics but no size."""
+    whole = _find(fields, _MATRIX_NAMES) or all(_find(fields, _FIELD_NAMES[key]) for key in ("fx", "fy", "cx", "cy"))
+    if whole and not any(_find(fields, _FIELD_NAMES[key]) for key in ("width", "height")):
+        return {}
+    return {key: _number(name, key, _field(name, fields, key)) for key in ("width", "height")}
+
+
+def _camera(name: str, values: dict[str, float], model: str, k: list[float], calibration: bool) -> Known:
+    distortion = () if model == "none" else tuple(k)
+    size = {"width": values.get("width", 1), "height": values.get("height", 1)}
     try:
-        camera = Camera(**values, distortion_model=model, distortion=() if model == "none" else tuple(k))  # type: ignore[arg-type]
+        camera = Camera(**{**values, **size}, distortion_model=model, distortion=distortion)  # type: ignore[arg-type]
     except (InputError, OverflowError, ValueError) as error:
         raise InputError(f"{name}: {error}") from None
     if camera.cx == 0 == camera.cy:
         raise InputError(f"{name}: cx and cy are both 0; give the sensor's own intrinsics with --camera FILE")
-    return camera
+    if "width" in values and not calibration:
+        return camera
+    known = (camera.width, camera.height) if "width" in values else None
+    return Intrinsics(camera.fx, camera.fy, camera.cx, camera.cy, model, camera.distortion, known)
 
 
 def _has_focal_length(fields: Mapping[str, Any]) -> bool:
-    return any(key in fields for key in (*_FIELD_NAMES["fx"], *_MATRIX_NAMES, "intrinsic_matrix"))
+    return _find(fields, (*_FIELD_NAMES["fx"], *_MATRIX_NAMES)) is not None
+
+
+def _find(fields: Mapping[str, Any], names: Sequence[str]) -> str | None:
+    """The first of the names that a file has, as the file spells it: cameraMatrix, Camera_Matrix and so on."""
+    spelled = {_plain(key): key for key in reversed(list(fields)) if isinstance(key, str)}
+    return next((spelled[_plain(name)] for name in names if _plain(name) in spelled), None)
+
+
+def _plain(name: str) -> str:
+    return name.lower().replace("_", "").replace("-", "")
 
 
 def _field(name: str, fields: Mapping[str, Any], key: str) -> Any:
-    for alias in _FIELD_NAMES[key]:
-        if alias in fields:
-            return fields[alias]
+    if (found := _find(fields, _FIELD_NAMES[key])) is not None:
+        return fields[found]
     raise InputError(f"{name}: '{key}' is missing; a camera file has width, height, fx, fy, cx, cy")
 
 
@@ -93,13 +123,12 @@ def _number(name: str, key: str, value: Any) -> float:
 
 
 def _focal_lengths(name: str, fields: Mapping[str, Any]) -> dict[str, float]:
-    if "intrinsic_matrix" in fields:
-        return _by_column(name, _matrix(name, "intrinsic_matrix", fields["intrinsic_matrix"]))
-    if any(alias in fields for alias in _FIELD_NAMES["fx"]):
+    key = _find(fields, ("intrinsic_matrix",))
+    if key is None and _find(fields, _FIELD_NAMES["fx"]) is not None:
         return {key: _number(name, key, _field(name, fields, key)) for key in ("fx", "fy", "cx", "cy")}
-    for key in _MATRIX_NAMES:
-        if key in fields:
-            return _by_row(name, key, _matrix(name, key, fields[key]))
+    key = key or _find(fields, _MATRIX_NAMES)
+    if key is not None:
+        return _by_row(name, key, _turned(_matrix(name, key, fields[key])))
     raise InputError(f"{name}: 'fx' is missing; a camera file has width, height, fx, fy, cx, cy")
 
 
@@ -114,11 +143,11 @@ def _matrix(name: str, key: str, value: Any) -> list[float]:
     return [_number(name, f"{key}[{i}]", item) for i, item in enumerate(flat)]
 
 
-def _by_column(name: str, m: list[float]) -> dict[str, float]:
-    """Open3D writes the matrix column by column: cx and cy are the elements 6 and 7. Rows are told by their zeros."""
-    if m[2] == 0 == m[5]:
-        m = [m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]]
-    return _by_row(name, "intrinsic_matrix", m)
+def _turned(m: list[float]) -> list[float]:
+    """The matrix row by row: Open3D and Record3D write it column by column, which its zeros tell."""
+    if m[2] == 0 == m[5] and (m[6] or m[7]):
+        return [m[0], m[3], m[6], m[1], m[4], m[7], m[2], m[5], m[8]]
+    return m
 
 
 def _by_row(name: str, key: str, m: list[float]) -> dict[str, float]:
@@ -127,14 +156,31 @@ def _by_row(name: str, key: str, m: list[float]) -> dict[str, float]:
     return {"fx": m[0], "fy": m[4], "cx": m[2], "cy": m[5]}
 
 
+def _lens(name: str, fields: Mapping[str, Any], named: str) -> tuple[str, list[float]]:
+    """Model and coefficients; under OpenCV's names their number tells a model that is not named."""
+    k = _coefficients(name, fields, fisheye=is_fisheye(named))
+    if named or _find(fields, _OPENCV_COEFFICIENTS) is None:
+        return named, k
+    while k and k[-1] == 0:
+        k.pop()
+    return ("rational" if len(k) > 5 else "plumb_bob"), k
+
+
 def _coefficients(name: str, fields: Mapping[str, Any], fisheye: bool) -> list[float]:
-    key = next((key for key in _COEFFICIENT_NAMES if not isinstance(fields.get(key), str | None)), None)
+    key = next((key for known in _COEFFICIENT_NAMES if (key := _given(fields, known))), None)
     value = fields[key] if key else fields
     if isinstance(value, Mapping):
         value = value["data"] if "data" in value else _by_name(value, fisheye)
     if not isinstance(value, list | tuple):
         raise InputError(f"{name}: '{key}' is {value!r}, not a list of numbers; correct the camera file")
-    return [_number(name, f"{key}[{i}]", item) for i, item in enumerate(value)]
+    flat = [item for row in value for item in (row if isinstance(row, list) else [row])]
+    return [_number(name, f"{key}[{i}]", item) for i, item in enumerate(flat)]
+
+
+def _given(fields: Mapping[str, Any], name: str) -> str | None:
+    """The spelling under which a file gives coefficients; a word or nothing there is none."""
+    key = _find(fields, (name,))
+    return None if key is None or isinstance(fields[key], str | None) else key
 
 
 def _by_name(fields: Mapping[str, Any], fisheye: bool) -> list[Any]:
@@ -173,7 +219,7 @@ def depth_unit_of(name: str, fields: Mapping[str, Any]) -> float | None:
 
 def from_matrix(name: str, matrix: Any, width: int, height: int) -> Camera:
     """A pinhole camera from its (3, 3) matrix ``[[fx, 0, cx], [0, fy, cy], [0, 0, 1]]``."""
-    return from_fields(name, {"K": np.asarray(matrix).tolist(), "width": width, "height": height}).cameras[0]
+    return camera(name, width, height, np.asarray(matrix).tolist())
 
 
 def camera(
@@ -189,4 +235,11 @@ def camera(
     Raises `InputError` that starts with `name` and names the field.
     """
     fields = {"width": width, "height": height, "K": list(matrix), "distortion_model": model, "D": list(coefficients)}
-    return from_fields(name, fields).cameras[0]
+    return sized(name, from_fields(name, fields).cameras[0])
+
+
+def sized(name: str, camera: Known) -> Camera:
+    """A camera where its size is needed; raises `InputError` where it has none."""
+    if not isinstance(camera, Camera):
+        raise InputError(f"{name}: 'width' is missing; a camera file has width, height, fx, fy, cx, cy")
+    return camera
