@@ -16,9 +16,9 @@ from silos import known, scene
 from siloscope.content import Content, Parts
 from siloscope.errors import InputError, UsageError
 from siloscope.simulation import Feed
-from siloscope.track import track_of
-from siloscope.tracking.events import legs
-from siloscope.tracking.story import Moment
+from siloscope.tracking.events import events, legs
+from siloscope.tracking.story import Moment, track_of
+from siloscope.tracking.use import Rate, forecast, use
 from siloscope.types.track import DAY, utc
 
 START = 1_772_000_000.0
@@ -156,3 +156,28 @@ def test_only_absolute_times_are_dates() -> None:
     assert utc(START) == "2026-02-25T06:13:20Z"
     assert utc(12.0) is None
     assert utc(None) is None
+
+
+def test_stored_readings_give_events_and_use_without_a_frame() -> None:
+    """What a service has in its database is enough: times, volumes, deviations."""
+    volume = np.concatenate([np.linspace(6.0, 2.0, 41), np.linspace(3.0, 8.0, 6), np.linspace(7.9, 5.0, 30)])
+    time = START + 3600.0 * np.arange(len(volume))
+    own, std = np.full(len(volume), 0.002), np.full(len(volume), 0.02)
+    found = events(time, volume, own, capacity=10.0, mass=600.0 * volume)
+    same = story(list(volume))
+    assert [event.to_dict() for event in found] == [event.to_dict() for event in same.events]
+    assert use(time, volume, std, found) == same.use
+    unknown = np.full(len(volume), np.nan)
+    assert [(e.start, e.mass, e.kind) for e in events(unknown, volume, unknown)] == [
+        (None, None, "withdrawal"),
+        (None, None, "refill"),
+        (None, None, "withdrawal"),
+    ]
+    assert use(unknown, volume, std, found) is None
+    assert events([], [], []) == ()
+
+
+def test_the_forecast_of_a_steady_use_is_its_quotient() -> None:
+    empty, earliest, latest = forecast(6.0, 0.0, Rate(0.5, 0.0, 0.0))
+    assert empty == earliest == latest == pytest.approx(12.0, abs=1e-6)
+    assert forecast(6.0, 0.0, Rate(1e-6, 0.0, 0.0)) == (None, None, None)

@@ -13,12 +13,10 @@ from siloscope.errors import InputError, UsageError
 from siloscope.io import FrameSource
 from siloscope.io.given import given_frames
 from siloscope.measure import measure
-from siloscope.tracking.events import events
-from siloscope.tracking.story import Moment
-from siloscope.tracking.use import use
+from siloscope.tracking.story import Moment, track_of
 from siloscope.types.calibration import Calibration
 from siloscope.types.frame import Frame
-from siloscope.types.track import Reading, Track
+from siloscope.types.track import Track
 
 TOGETHER = 120.0
 """Seconds between two frames that still tell whether the content moves while they are taken."""
@@ -114,61 +112,3 @@ def _measured(
 
 def _together(before: float | None, now: float | None) -> bool:
     return before is not None and now is not None and 0.0 <= now - before <= TOGETHER
-
-
-def track_of(moments: Sequence[Moment], last: Content | None = None, problems: tuple[str, ...] = ()) -> Track:
-    """The story of readings in their order; `last` is the newest one with its surface, `problems` what was not read."""
-    answered = [m for m in moments if m.content.volume is not None]
-    happened = tuple(events(answered))
-    readings = tuple(_readings(moments))
-    unread = tuple(Reading(len(moments) + i, name, None, "unreadable", name) for i, name in enumerate(problems))
-    return Track(
-        readings + unread,
-        happened,
-        use(answered, happened),
-        None if last is None else last.capacity,
-        None if last is None else last.height_datum,
-        problems,
-        last,
-        {} if last is None else last.config,
-    )
-
-
-def _readings(moments: Sequence[Moment]) -> Iterator[Reading]:
-    """The rows of the table; where the cone is not known, heights are over the lowest point of the whole story."""
-    lowest = max((m.datum for m in moments if m.datum is not None), default=0.0)
-    before: Moment | None = None
-    for moment in moments:
-        c = moment.content
-        lift = 0.0 if moment.datum is None else lowest - moment.datum
-        flow = None if before is None else _flow(before, moment)
-        dense = c if c.volume or before is None else before.content
-        tonnes = (
-            None if flow is None or dense.mass is None or not dense.volume else 1e-3 * flow * dense.mass / dense.volume
-        )
-        yield Reading(
-            moment.index,
-            c.source,
-            moment.time,
-            c.status,
-            c.reason if c.status == "refused" else c.message,
-            c.volume,
-            c.volume_std,
-            c.fill_fraction,
-            None if c.level.mean is None else c.level.mean + lift,
-            c.mass,
-            c.mass_std,
-            c.coverage,
-            flow,
-            tonnes,
-            tuple(remark.code for remark in c.quality),
-        )
-        before = moment if c.volume is not None else before
-
-
-def _flow(before: Moment, now: Moment) -> float | None:
-    """m³/h between two readings."""
-    if before.content.volume is None or now.content.volume is None or before.time is None or now.time is None:
-        return None
-    hours = (now.time - before.time) / 3600.0
-    return (now.content.volume - before.content.volume) / hours if hours > 0.0 else None

@@ -2,46 +2,75 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from siloscope.tracking.story import Moment
 from siloscope.types.track import Event
 
 TURN_SIGMAS = 5.0
-"""A rise or fall must exceed so many standard deviations of a difference to be an event."""
+"""Standard deviations of a difference that a rise or fall must exceed to be an event."""
 
-TURN_SHARE = 0.002
-"""And this share of the capacity: what dust, settling and temperature do to a quiet silo."""
+TURN_FRACTION = 0.002
+"""And this fraction of the capacity: what dust, settling and temperature do to a quiet silo."""
 
 
-def events(moments: list[Moment]) -> Iterator[Event]:
-    """Rises and falls between the turning points of the volume."""
-    if len(moments) < 2:
-        return
-    volume = np.array([float(m.content.volume or 0.0) for m in moments])
-    least = _threshold(moments)
-    for first, last in legs(volume, least):
-        first, last = _trimmed(volume, first, last, 0.1 * least)
-        change = moments[last].content.change_since(moments[first].content)
-        amount, std = change if change is not None else (volume[last] - volume[first], least / TURN_SIGMAS)
-        start, end = moments[first], moments[last]
+def events(
+    time: ArrayLike,
+    volume: ArrayLike,
+    own_std: ArrayLike,
+    *,
+    capacity: float | None = None,
+    mass: ArrayLike | None = None,
+) -> tuple[Event, ...]:
+    """Rises and falls between the turning points of the volume, from readings in their order.
+
+    Parameters
+    ----------
+    time : array (N,)
+        Seconds; NaN where not known.
+    volume : array (N,)
+        m³.
+    own_std : array (N,)
+        The part of each volume's standard deviation that differs from reading to reading, m³ (`Content.own_std`): what
+        all readings of one calibration share drops out of a difference. NaN where not known.
+    capacity : float, optional
+        Of the silo, m³: changes below `TURN_FRACTION` of it are no events.
+    mass : array (N,), optional
+        Of the content at each reading, kg; NaN where not known.
+
+    Returns
+    -------
+    tuple of Event
+        `first` and `last` are places in these arrays.
+    """
+    times, volumes, own = (np.asarray(values, np.float64) for values in (time, volume, own_std))
+    masses = np.full(len(volumes), np.nan) if mass is None else np.asarray(mass, np.float64)
+    if len(volumes) < 2:
+        return ()
+    least = _threshold(own, capacity)
+    found = []
+    for turn, next_turn in legs(volumes, least):
+        first, last = _trimmed(volumes, turn, next_turn, 0.1 * least)
+        amount, std = float(volumes[last] - volumes[first]), float(np.hypot(own[first], own[last]))
+        std = std if math.isfinite(std) else least / TURN_SIGMAS
         kind = "refill" if amount > 0.0 else "withdrawal"
-        dense = end.content if kind == "refill" else start.content
-        mass = None if dense.mass is None or not dense.volume else abs(amount) * dense.mass / dense.volume
-        yield Event(kind, start.index, end.index, start.time, end.time, abs(float(amount)), float(std), mass)
+        known = last if kind == "refill" else first
+        moved = abs(amount) * float(masses[known]) / float(volumes[known]) if volumes[known] else math.nan
+        start, end = (None if math.isnan(t) else float(t) for t in (times[first], times[last]))
+        found.append(Event(kind, first, last, start, end, abs(amount), std, None if math.isnan(moved) else moved))
+    return tuple(found)
 
 
-def _threshold(moments: list[Moment]) -> float:
-    """Smallest change that is an event."""
-    pairs = pairwise(moments)
-    changes = [b.content.change_since(a.content) for a, b in pairs]
-    std = [change[1] for change in changes if change is not None]
-    capacity = moments[-1].content.capacity or 0.0
-    return max(TURN_SIGMAS * float(np.median(std)) if std else 0.0, TURN_SHARE * capacity, 1e-9)
+def _threshold(own_std: NDArray[np.float64], capacity: float | None) -> float:
+    """Smallest change that is an event, m³."""
+    changes = np.hypot(own_std[:-1], own_std[1:])
+    known = changes[np.isfinite(changes)]
+    noise = TURN_SIGMAS * float(np.median(known)) if len(known) else 0.0
+    return max(noise, TURN_FRACTION * (capacity or 0.0), 1e-9)
 
 
 def legs(volume: NDArray[np.float64], least: float) -> Iterator[tuple[int, int]]:

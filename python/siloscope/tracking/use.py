@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from siloscope.tracking.story import Moment
 from siloscope.types.track import DAY, Event, Use
 
 FEWEST_DAYS = 1.0
@@ -20,24 +21,53 @@ FARTHEST = 3650.0
 """Days beyond which nobody forecasts."""
 
 
-def use(moments: list[Moment], events: tuple[Event, ...]) -> Use | None:
-    """Daily use from the withdrawals, and when it has used up what there is."""
-    timed = [m for m in moments if m.time is not None]
-    if len(timed) < 2:
+def use(time: ArrayLike, volume: ArrayLike, std: ArrayLike, events: Sequence[Event]) -> Use | None:
+    """Daily use from the withdrawals, and when it has used up what there is.
+
+    Parameters
+    ----------
+    time, volume, std : array (N,)
+        Seconds, volume and its standard deviation, m³, of readings in their order; readings with a NaN as time are left
+        out.
+    events : sequence of Event
+        What `siloscope.tracking.events.events` found in them; while a refill lasts nothing counts as used.
+
+    Returns
+    -------
+    Use or None
+        None for less than `FEWEST_DAYS`, where nothing was withdrawn, or where times don't rise.
+    """
+    timed = np.isfinite(np.asarray(time, np.float64))
+    times, volumes, deviations = (np.asarray(values, np.float64)[timed] for values in (time, volume, std))
+    if len(times) < 2:
         return None
-    times = np.array([float(m.time or 0.0) for m in timed])
-    volume = np.array([float(m.content.volume or 0.0) for m in timed])
     span = (times[-1] - times[0]) / DAY
-    used = _used(times, volume, events)
+    used = _used(times, volumes, events)
     if not FEWEST_DAYS <= span <= MOST_DAYS or used[-1] <= 0.0 or (np.diff(times) < 0.0).any():
         return None
     daily = float(used[-1]) / span
     spread = _day_to_day(times, used, daily)
-    mean_std = spread / math.sqrt(span)
-    own = float(timed[-1].content.volume_std or 0.0)
-    dates = [_empty(volume[-1], own, daily, spread, mean_std, sigmas) for sigmas in (0.0, 2.0, -2.0)]
-    empty, earliest, latest = (None if days is None else float(times[-1] + DAY * days) for days in dates)
-    return Use(daily, mean_std, spread, empty, earliest, latest)
+    rate = Rate(daily, spread / math.sqrt(span), spread)
+    days = forecast(float(volumes[-1]), float(np.nan_to_num(deviations[-1])), rate)
+    empty, earliest, latest = (None if until is None else float(times[-1] + DAY * until) for until in days)
+    return Use(rate.daily, rate.daily_std, rate.day_to_day, empty, earliest, latest)
+
+
+class Rate(NamedTuple):
+    """What is used a day, m³: mean, its standard deviation, and that of one day."""
+
+    daily: float
+    daily_std: float
+    day_to_day: float
+
+
+def forecast(volume: float, std: float, rate: Rate) -> tuple[float | None, float | None, float | None]:
+    """Days until a volume (m³, with its standard deviation) is used up: expected, earliest and latest (95 %).
+
+    None for what lies beyond `FARTHEST`.
+    """
+    empty, earliest, latest = (_empty(volume, std, *rate, sigmas) for sigmas in (0.0, 2.0, -2.0))
+    return empty, earliest, latest
 
 
 def _day_to_day(times: NDArray[np.float64], used: NDArray[np.float64], daily: float) -> float:
@@ -49,7 +79,7 @@ def _day_to_day(times: NDArray[np.float64], used: NDArray[np.float64], daily: fl
     return float(np.std(np.diff(np.interp(ends, times, used)), ddof=1))
 
 
-def _used(times: NDArray[np.float64], volume: NDArray[np.float64], events: tuple[Event, ...]) -> NDArray[np.float64]:
+def _used(times: NDArray[np.float64], volume: NDArray[np.float64], events: Sequence[Event]) -> NDArray[np.float64]:
     """Volume taken out since the beginning: the falls, with the refills left out."""
     change = np.diff(volume)
     filling = np.zeros(len(change), bool)
@@ -60,7 +90,7 @@ def _used(times: NDArray[np.float64], volume: NDArray[np.float64], events: tuple
     return np.maximum.accumulate(taken)
 
 
-def _empty(volume: float, std: float, daily: float, spread: float, mean_std: float, sigmas: float) -> float | None:
+def _empty(volume: float, std: float, daily: float, mean_std: float, spread: float, sigmas: float) -> float | None:
     """Days until `daily t + sigmas √(spread² t + mean_std² t² + std²)` reaches the volume; None beyond ten years."""
 
     def left(t: float) -> float:

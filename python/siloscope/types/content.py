@@ -141,15 +141,21 @@ class Content:
         """Volume that still fits, m³."""
         return None if self.volume is None or self.capacity is None else self.capacity - self.volume
 
-    def change_since(self, earlier: Content) -> tuple[float, float] | None:
-        """Volume gained since an earlier reading, m³, and its standard deviation; None where one has no volume.
+    @property
+    def own_std(self) -> float | None:
+        """The part of the volume's deviation that differs from reading to reading, m³: noise, grid, some of the unseen.
 
-        Pose, geometry and depth err alike in both readings, so they drop out.
+        Pose, geometry and depth err alike in all readings of one calibration, so they drop out of a difference.
         """
-        if self.volume is None or earlier.volume is None or self.parts is None or earlier.parts is None:
+        if self.parts is None:
             return None
-        own = [(p.noise, p.grid, HIDDEN_ALIKE * p.unseen) for p in (self.parts, earlier.parts)]
-        return self.volume - earlier.volume, math.hypot(*own[0], *own[1])
+        return math.hypot(self.parts.noise, self.parts.grid, HIDDEN_ALIKE * self.parts.unseen)
+
+    def change_since(self, earlier: Content) -> tuple[float, float] | None:
+        """Volume gained since an earlier reading, m³, and its standard deviation (`own_std`); None without a volume."""
+        if self.volume is None or earlier.volume is None or self.own_std is None or earlier.own_std is None:
+            return None
+        return self.volume - earlier.volume, math.hypot(self.own_std, earlier.own_std)
 
     def has(self, code: str) -> bool:
         """Whether a remark of this code is there."""
