@@ -8,13 +8,13 @@ from dataclasses import dataclass, replace
 from os import PathLike
 from typing import Any
 
-from siloscope.content import Content
 from siloscope.errors import InputError, UsageError
 from siloscope.io import FrameSource
 from siloscope.io.given import given_frames
 from siloscope.measure import measure
 from siloscope.tracking.story import Moment, track_of
 from siloscope.types.calibration import Calibration
+from siloscope.types.content import Content
 from siloscope.types.frame import Frame
 from siloscope.types.track import Track
 

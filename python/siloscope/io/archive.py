@@ -10,7 +10,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import struct
 from collections.abc import Iterable, Iterator
 from functools import partial
 from pathlib import Path
@@ -20,8 +19,15 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope import _core
 from siloscope.errors import InputError
+from siloscope.io.archive_layout import (
+    array_document,
+    compressed,
+    decompressed,
+    document_bytes,
+    with_checksum,
+    without_checksum,
+)
 from siloscope.io.source import Format, FrameSource, Item, Options, check_image_size
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
@@ -32,32 +38,6 @@ _LARGEST_METADATA = 1 << 20
 _ROWS = 1024
 """Frames a chunk of the small arrays."""
 _DTYPES = ("uint16", "float32", "float64")
-_CHECKSUM = {"name": "crc32c"}
-_BYTES = {"name": "bytes", "configuration": {"endian": "little"}}
-
-
-# With the bytes of the pixels sorted by weight, LZ4 HC packs like Zstandard and unpacks twice as fast.
-def _blosc(itemsize: int) -> dict[str, Any]:
-    setting = {"cname": "lz4hc", "clevel": 5, "shuffle": "shuffle", "typesize": itemsize, "blocksize": 0}
-    return {"name": "blosc", "configuration": setting}
-
-
-def _array(shape: list[int], chunk: list[int], dtype: str, names: list[str], **more: Any) -> dict[str, Any]:
-    """The ``zarr.json`` of an array; chunks lie flat in its folder as ``c.0.0.0``."""
-    compressor = [_blosc(np.dtype(dtype).itemsize)] if "attributes" in more else []
-    return {
-        "zarr_format": 3,
-        "node_type": "array",
-        "shape": shape,
-        "data_type": dtype,
-        "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
-        "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
-        "fill_value": 0 if dtype == "uint16" else "NaN",
-        "codecs": [_BYTES, *compressor, _CHECKSUM],
-        "dimension_names": names,
-        "attributes": {},
-        **more,
-    }
 
 
 class Writer:
@@ -101,7 +81,8 @@ class Writer:
         head = _head_of(frame, depth)
         if self._head is None:
             self._begin(head, frame)
-        self._check_alike(head, frame)
+        else:
+            self._check_alike(self._head, head, frame)
         self._write_frame(frame, depth)
         self.count += 1
         self._write_lengths(depth)
@@ -113,15 +94,14 @@ class Writer:
         self._write_lengths(np.empty((head["height"], head["width"]), head["dtype"]))
         attributes = {**head, "provenance": {k: v for k, v in frame.provenance.items() if k != "frame"}}
         group = {"zarr_format": 3, "node_type": "group", "attributes": attributes}
-        _replace(self.path / _GROUP, _json(group))
+        _replace(self.path / _GROUP, document_bytes(group))
 
-    def _check_alike(self, head: dict[str, Any], frame: Frame) -> None:
-        assert self._head is not None
+    def _check_alike(self, known: dict[str, Any], head: dict[str, Any], frame: Frame) -> None:
         for key, value in head.items():
-            if self._head.get(key) != value:
+            if known.get(key) != value:
                 raise InputError(
                     f"{frame.source}: its {key.replace('_', ' ')} is {value}, that of {self.path} is "
-                    f"{self._head.get(key)}; an archive holds frames of one camera, write another one"
+                    f"{known.get(key)}; an archive holds frames of one camera, write another one"
                 )
 
     def _write_frame(self, frame: Frame, depth: NDArray[Any]) -> None:
@@ -131,9 +111,9 @@ class Writer:
         self._times[row] = math.nan if frame.timestamp is None else frame.timestamp
         self._gravities[row] = np.nan if frame.gravity is None else frame.gravity
         chunk = self.count // _ROWS
-        _replace(self.path / "depth" / f"c.{self.count}.0.0", _checked(_compress(depth)))
-        _replace(self.path / "timestamp" / f"c.{chunk}", _checked(self._times.astype("<f8").tobytes()))
-        _replace(self.path / "gravity" / f"c.{chunk}.0", _checked(self._gravities.astype("<f8").tobytes()))
+        _replace(self.path / "depth" / f"c.{self.count}.0.0", with_checksum(compressed(depth)))
+        _replace(self.path / "timestamp" / f"c.{chunk}", with_checksum(self._times.astype("<f8").tobytes()))
+        _replace(self.path / "gravity" / f"c.{chunk}.0", with_checksum(self._gravities.astype("<f8").tobytes()))
 
     def _write_lengths(self, depth: NDArray[Any]) -> None:
         """The arrays' descriptions; that of the depth last, for it says how many frames there are."""
@@ -142,9 +122,9 @@ class Writer:
         # xarray and GDAL make metres of these.
         attributes = {"units": "m", "scale_factor": unit if unit is not None else 1.0}
         arrays = {
-            "timestamp": _array([self.count], [_ROWS], "float64", ["frame"]),
-            "gravity": _array([self.count, 3], [_ROWS, 3], "float64", ["frame", "axis"]),
-            "depth": _array(
+            "timestamp": array_document([self.count], [_ROWS], "float64", ["frame"]),
+            "gravity": array_document([self.count, 3], [_ROWS, 3], "float64", ["frame", "axis"]),
+            "depth": array_document(
                 [self.count, height, width],
                 [1, height, width],
                 depth.dtype.name,
@@ -153,7 +133,7 @@ class Writer:
             ),
         }
         for name, array in arrays.items():
-            _replace(self.path / name / _GROUP, _json(array))
+            _replace(self.path / name / _GROUP, document_bytes(array))
 
     def __enter__(self) -> Self:
         return self
@@ -187,47 +167,11 @@ def _head_of(frame: Frame, depth: NDArray[Any]) -> dict[str, Any]:
     }
 
 
-def _json(document: dict[str, Any]) -> bytes:
-    return json.dumps(document, indent=1, default=str).encode()
-
-
 def _replace(path: Path, data: bytes) -> None:
     """Writes a whole file or nothing."""
     beside = path.with_name(f".{path.name}.new")
     beside.write_bytes(data)
     beside.replace(path)
-
-
-def _checked(data: bytes) -> bytes:
-    return data + struct.pack("<I", _core.checksum(data))
-
-
-def _unchecked(data: bytes) -> bytes:
-    if len(data) < 4 or struct.unpack("<I", data[-4:])[0] != _core.checksum(data[:-4]):
-        raise InputError("its chunk fails the checksum; the file is damaged")
-    return data[:-4]
-
-
-def _compress(depth: NDArray[Any]) -> bytes:
-    from numcodecs.blosc import Blosc
-
-    packed: bytes = Blosc("lz4hc", 5, Blosc.SHUFFLE).encode(np.ascontiguousarray(depth))
-    return packed
-
-
-def _decompress(data: bytes, shape: tuple[int, int], dtype: str) -> NDArray[Any]:
-    from numcodecs.blosc import Blosc
-
-    size = shape[0] * shape[1] * np.dtype(dtype).itemsize
-    told, _, stored = struct.unpack_from("<III", data, 4) if len(data) >= 16 else (0, 0, 0)
-    if (told, stored) != (size, len(data)):
-        raise InputError(f"its chunk is declared {told} bytes large, not {size}; the file is damaged")
-    depth = np.empty(shape, dtype)
-    try:
-        Blosc().decode(data, depth)
-    except (RuntimeError, ValueError) as error:
-        raise InputError(f"its chunk is damaged ({error})") from None
-    return depth
 
 
 class ArchiveSource(FrameSource):
@@ -274,12 +218,13 @@ class ArchiveSource(FrameSource):
         shape, dtype = array.get("shape"), array.get("data_type")
         codecs = array.get("codecs")
         names = [codec.get("name") for codec in codecs if isinstance(codec, dict)] if isinstance(codecs, list) else []
-        whole = isinstance(shape, list) and len(shape) == 3 and all(type(n) is int and n >= 0 for n in shape)
+        sides = shape if isinstance(shape, list) and len(shape) == 3 else []
+        whole = bool(sides) and all(type(n) is int and n >= 0 for n in sides)
         if not whole or dtype not in _DTYPES or names != ["bytes", "blosc", "crc32c"]:
             raise InputError(f"{self.name}: its depth array is not as siloscope writes it; convert the frames again")
-        assert isinstance(shape, list)
-        check_image_size(self.name, shape[2], shape[1])
-        return str(dtype), (shape[1], shape[2]), shape[0]
+        frames, height, width = sides
+        check_image_size(self.name, width, height)
+        return str(dtype), (height, width), frames
 
     def _numbers(self) -> list[int]:
         """Numbers of the frames that are there, in order."""
@@ -295,7 +240,7 @@ class ArchiveSource(FrameSource):
         for chunk in range(len(rows) // _ROWS):
             path = self.path / name / (f"c.{chunk}" if width == 1 else f"c.{chunk}.0")
             try:
-                data = _unchecked(path.read_bytes())
+                data = without_checksum(path.read_bytes())
             except (OSError, InputError):
                 continue
             if len(data) == _ROWS * width * 8:
@@ -332,7 +277,7 @@ class ArchiveSource(FrameSource):
             data = path.read_bytes()
         except OSError as error:
             raise InputError(f"frame {number}: {path} can't be read ({error.strerror})") from None
-        depth = _decompress(_unchecked(data), self.shape, self.dtype)
+        depth = decompressed(without_checksum(data), self.shape, self.dtype)
         time, gravity = float(self.times[number]), self.gravities[number]
         return Frame(
             depth=depth,

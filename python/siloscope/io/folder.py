@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -41,6 +41,7 @@ class FolderSource(FrameSource):
         super().__init__(path, "folder", options)
         self.files = tuple(files)
         self.file_format = format
+        self._read_one = _one_frame_of(format)
         self.provenance |= {"layout": layout, "files": format.name}
         self._gravity: list[Any] = [None] * len(files)
         if size := self._image_size:
@@ -65,8 +66,7 @@ class FolderSource(FrameSource):
             yield Item(str(file.relative_to(self.path)), partial(self._read, index))
 
     def _read(self, index: int) -> Frame:
-        assert self.file_format.read_one is not None
-        frame = self.file_format.read_one(self.files[index])
+        frame = self._read_one(self.files[index])
         time = self.timestamps[index] if self.timestamps else frame.timestamp
         gravity = self._gravity[index]
         return replace(frame, timestamp=time, gravity=frame.gravity if gravity is None else gravity)
@@ -194,3 +194,10 @@ def _tum_line(path: Path, number: int, line: str) -> tuple[float, Path]:
 
 
 FORMAT = Format("folder", lambda head, path: path.is_dir() and not head, _open)
+
+
+def _one_frame_of(format: Format) -> Callable[[Path], Frame]:
+    """What reads a file of one frame; every format in `_FORMATS` has it."""
+    if format.read_one is None:
+        raise InputError(f"files of the format {format.name} have no single frames; give the files themselves")
+    return format.read_one

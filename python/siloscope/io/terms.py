@@ -67,25 +67,24 @@ def finish(frame: Frame, options: Options) -> Frame:
 def _with_unit(frame: Frame, options: Options) -> Frame:
     given = options.depth_unit
     if frame.points is not None:
-        return _with_metric_points(frame, given)
-    if frame.depth is None:
+        return _with_metric_points(frame, frame.points, given)
+    depth = frame.depth
+    if depth is None:
         return frame
-    if np.issubdtype(frame.depth.dtype, np.floating):
-        return _with_metres(frame, given)
+    if np.issubdtype(depth.dtype, np.floating):
+        return _with_metres(frame, depth, given)
     if given is not None:
-        return _with_raw_units(_with_origin(frame, depth_unit_from="given"), given)
+        return _with_raw_units(_with_origin(frame, depth_unit_from="given"), depth, given)
     if options.camera_depth_unit is not None:
         frame = _with_origin(frame, depth_unit_from="given camera file")
-    return _with_raw_units(frame, options.camera_depth_unit)
+    return _with_raw_units(frame, depth, options.camera_depth_unit)
 
 
 def _with_origin(frame: Frame, **known: Any) -> Frame:
     return replace(frame, provenance={**frame.provenance, **known})
 
 
-def _with_metric_points(frame: Frame, given: float | None) -> Frame:
-    points = frame.points
-    assert points is not None
+def _with_metric_points(frame: Frame, points: NDArray[Any], given: float | None) -> Frame:
     extent = _extent(points)
     if given is not None:
         factor, frame = _factor(frame, extent, given)
@@ -105,9 +104,7 @@ def _extent(points: NDArray[Any]) -> float:
     return float(np.ptp(np.percentile(few, [10, 90], axis=0), axis=0).max()) if len(few) else 0.0
 
 
-def _with_metres(frame: Frame, given: float | None) -> Frame:
-    depth = frame.depth
-    assert depth is not None
+def _with_metres(frame: Frame, depth: NDArray[Any], given: float | None) -> Frame:
     median = _median(depth)
     if given is not None:
         factor, frame = _factor(frame, median, given)
@@ -134,7 +131,7 @@ def _median(depth: NDArray[Any]) -> float:
     return float(np.median(few)) if few.size else 0.0
 
 
-def _with_raw_units(frame: Frame, given: float | None) -> Frame:
+def _with_raw_units(frame: Frame, depth: NDArray[Any], given: float | None) -> Frame:
     unit = frame.depth_unit if given is None else given
     if unit is None:
         raise UnknownUnit(
@@ -143,8 +140,6 @@ def _with_raw_units(frame: Frame, given: float | None) -> Frame:
         )
     if not (np.isfinite(unit) and 0 < unit <= 1):
         raise UnknownUnit(f"{frame.source}: a depth unit of {unit} m is not possible; give --depth-unit in metres")
-    depth = frame.depth
-    assert depth is not None
     possible = depth.dtype != np.uint16 or 65_535 * unit > FARTHEST_M
     if possible and (median := _median(depth) * unit) > FARTHEST_M:
         raise UnknownUnit(

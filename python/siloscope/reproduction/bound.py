@@ -34,11 +34,8 @@ def cramer_rao(frame: SimulatedFrame) -> NDArray[np.float64]:
 
 def _depth_slopes(frame: SimulatedFrame, wall: NDArray[np.bool_], cone: NDArray[np.bool_]) -> NDArray[np.float64]:
     """∂d/∂θ (N, 7) = -(∂F/∂θ) / (∇F·R q) for F = ρ - R on the cylinder and ρ - m (z_a - z) on the cone."""
-    pose, geometry = frame.scene.pose, frame.scene.silo.geometry
-    assert geometry.radius is not None
-    assert geometry.apex is not None
-    assert geometry.cylinder_bottom is not None
-    slope = geometry.radius / (geometry.apex - geometry.cylinder_bottom)
+    pose, walls = frame.scene.pose, frame.scene.silo
+    slope = walls.radius / (walls.apex - walls.cylinder_bottom)
     points = camera_points(frame.depth, frame.camera)[wall]
     silo = pose.to_silo(points)
     radial = silo[:, :2] / np.hypot(silo[:, 0], silo[:, 1])[:, None]
@@ -51,7 +48,7 @@ def _depth_slopes(frame: SimulatedFrame, wall: NDArray[np.bool_], cone: NDArray[
             np.einsum("ni,ij,nj->n", gradient, d_ry, points),
             radial,
             np.where(cone, 0.0, -1.0),
-            np.where(cone, silo[:, 2] - geometry.apex, 0.0),
+            np.where(cone, silo[:, 2] - walls.apex, 0.0),
             np.where(cone, -slope, 0.0),
         ]
     )

@@ -61,7 +61,8 @@ def _comparison(sensor: str, size: tuple[int, int], r_x: float, r_y: float, devi
     The paper gives the turns of D455 and L515 (Table 7) and no places; those, and the other turns, are reconstructed.
     """
     camera = sensors.load(sensor).camera(*size)
-    assert camera is not None
+    if camera is None:
+        raise UsageError(f"the profile '{sensor}' has no camera of {size[0]} x {size[1]} pixels")
     return Scene(COMPARISON_SILO, SiloPose(r_x, r_y, -0.62, 0.02), camera, None, sensor_model(sensor, device))
 
 

@@ -47,10 +47,19 @@ class Silo:
         return math.pi * self.radius**2 * (self.cylinder_height + self.cone_height / 3.0)
 
     @property
+    def cylinder_bottom(self) -> float:
+        """z where the cylinder meets the cone."""
+        return self.top + self.cylinder_height
+
+    @property
+    def apex(self) -> float:
+        """z of the cone's vertex."""
+        return self.cylinder_bottom + self.cone_height
+
+    @property
     def geometry(self) -> SiloGeometry:
         """The silo as estimates describe it."""
-        bottom = self.top + self.cylinder_height
-        return SiloGeometry(self.radius, bottom, bottom + self.cone_height)
+        return SiloGeometry(self.radius, self.cylinder_bottom, self.apex)
 
     def feed_heights(self, feed: Feed | None, places: ArrayLike) -> NDArray[np.float64]:
         """Height of the feed surface over the vertex at places (..., 2) of the silo frame's x and y.

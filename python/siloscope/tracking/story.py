@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from siloscope.content import Content
 from siloscope.tracking.events import events
 from siloscope.tracking.use import use
+from siloscope.types.content import Content
 from siloscope.types.track import Reading, Track
 
 

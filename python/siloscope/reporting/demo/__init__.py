@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 import siloscope
-from siloscope.content import Content
 from siloscope.simulation import ASTRA_S, Feed, Scene, Silo, SimulatedFrame, discharge
 from siloscope.simulation.metrics import pc_average_distance, transform_error
 from siloscope.simulation.scenarios import looking_at
 from siloscope.types.calibration import Calibration
+from siloscope.types.content import Content
 from siloscope.types.estimate import Estimate
 
 METHODS = ("surface", "shape-tensor")

@@ -6,12 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from siloscope.content import Content
 from siloscope.reporting import plots
 from siloscope.reporting.demo import Step
 from siloscope.reporting.plots.solid import surface_3d
 from siloscope.reporting.plots.trend import trend
 from siloscope.reporting.report import picture, table, text
+from siloscope.types.content import Content
 from siloscope.wording import with_std
 
 SHOWN = 6

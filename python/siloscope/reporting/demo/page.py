@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import siloscope
-from siloscope.content import Content
 from siloscope.reporting import plots
 from siloscope.reporting.demo import METHODS, SCENE, SENSOR, Step, content
 from siloscope.reporting.report import Report, command, picture, table, text
 from siloscope.reporting.results import pictures
 from siloscope.simulation.metrics import transform_error
 from siloscope.types.calibration import Calibration
+from siloscope.types.content import Content
 
 _NAMES = {"surface": "surface fit", "shape-tensor": "the paper's six steps"}
 _DPI = 100

@@ -82,9 +82,8 @@ class SensorProcess:
             raise InputError(
                 f"the camera's driver ended unexpectedly (exit code {self._process.exitcode}); plug the camera in again"
             ) from None
-        if isinstance(answer, str):
-            raise InputError(answer)
-        assert isinstance(answer, Frame)
+        if not isinstance(answer, Frame):
+            raise InputError(str(answer))
         if answer.camera != self._camera:
             self._camera = answer.camera
         # One camera object, whose rays are then computed once.

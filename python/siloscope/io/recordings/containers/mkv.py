@@ -190,9 +190,7 @@ class MkvSource(RecordedSource):
             raise
 
     def _time(self, entry: Entry) -> float:
-        recording = self.recording
-        assert isinstance(recording, Mkv)
-        return (recording.start_ns + entry.time_ns) / 1e9
+        return (self.mkv.start_ns + entry.time_ns) / 1e9
 
     def _decode(self, entry: Entry) -> Frame:
         width, height, _ = self.mkv.sizes[self.stream.name]
