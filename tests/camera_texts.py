@@ -65,8 +65,8 @@ cam1:
   intrinsics: [700.0, 700.0, 640.0, 400.0]
   resolution: [1280, 800]
 """
-MATRIX = [[281.5, 0, 161.5], [0, 282.25, 118.75], [0, 0, 1]]
-FOUR = [[*row, 0] for row in MATRIX] + [[0, 0, 0, 1]]
+MATRIX: list[list[float]] = [[281.5, 0, 161.5], [0, 282.25, 118.75], [0, 0, 1]]
+FOUR: list[list[float]] = [[*row, 0] for row in MATRIX] + [[0, 0, 0, 1]]
 
 
 def rows(matrix: list[list[float]], between: str) -> str:

@@ -16,9 +16,9 @@ import pytest
 from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, _core, calibrate, locate, sensors
 from siloscope.cli import main
 from siloscope.estimation.surface import fit_depth
-from siloscope.fusion.factors import LENGTHS, FrameFactors
+from siloscope.fusion.factors import LENGTHS, SCALE, FrameFactors
 from siloscope.fusion.relinearize import relinearized
-from siloscope.fusion.solve import SCALE, summed
+from siloscope.fusion.solve import summed
 from siloscope.parameters import PARAMETERS
 from siloscope.reproduction.discharges import real
 from siloscope.simulation import ASTRA_S, Feed, Scene, discharge

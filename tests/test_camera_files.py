@@ -95,7 +95,9 @@ LIBREALSENSE = {
 
 
 def parsed(text: str) -> Camera:
-    return camera_files.parse("camera", text).cameras[0]
+    (camera,) = camera_files.parse("camera", text).cameras
+    assert isinstance(camera, Camera)
+    return camera
 
 
 def test_open3d_is_read_column_by_column() -> None:

@@ -84,7 +84,7 @@ def test_a_calibration_of_another_scale_is_scaled_by_edges_not_centres(by: float
 
 def test_phones_hand_on_the_intrinsics_of_the_colour_image() -> None:
     """Stray Scanner's matrix has no size, Record3D's has the colour image's; depth is a fraction of either."""
-    full = [[1689.0, 0, 963.5], [0, 1693.5, 718.0], [0, 0, 1]]
+    full: list[list[float]] = [[1689.0, 0, 963.5], [0, 1693.5, 718.0], [0, 0, 1]]
     camera = camera_of(rows(full, ","), (256, 192))
     assert (camera.fx, camera.cx) == (pytest.approx(1689 / 7.5), pytest.approx(964 / 7.5 - 0.5))
     assert camera_of(json.dumps(RECORD3D)) == CAMERA
