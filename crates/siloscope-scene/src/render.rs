@@ -2,7 +2,8 @@
 
 use crate::hit::Label;
 use crate::world::World;
-use siloscope::{Camera, Error, Result, SiloPose, Vec3};
+pub use siloscope::base::workers::check_threads;
+use siloscope::{Camera, Result, SiloPose, Vec3};
 
 /// An exact frame; row by row.
 #[derive(Debug, Clone)]
@@ -14,9 +15,6 @@ pub struct Exact {
     /// Unit normal towards the camera's side, in the camera frame; 0 where nothing is hit.
     pub normals: Vec<[f64; 3]>,
 }
-
-/// Largest number of threads accepted.
-pub const MAX_THREADS: usize = 1024;
 
 /// Casts a ray through every pixel. The camera sits at `(t_x, t_y, 0)` of the silo frame; depths are float64.
 pub fn render(world: &dyn World, camera: &Camera, pose: &SiloPose, threads: usize) -> Result<Exact> {
@@ -59,14 +57,6 @@ fn cast_band(
             *normal = rotation.tr_mul(&hit.normal).into();
         }
     }
-}
-
-/// Refuses 0 threads and absurd numbers.
-pub fn check_threads(threads: usize) -> Result<()> {
-    if (1..=MAX_THREADS).contains(&threads) {
-        return Ok(());
-    }
-    Err(Error::Setting { name: "threads", bounds: "between 1 and 1024", value: threads as f64 })
 }
 
 fn check_pose(pose: &SiloPose) -> Result<()> {

@@ -32,11 +32,12 @@ fn code(file: &Path) -> String {
     text.split("#[cfg(test)]").next().unwrap_or_default().to_string()
 }
 
-/// Every path that follows `crate::` or `super::` in the code, with the names of a `{…}` list one by one.
+/// Every path that follows `crate::`, `super::` or `self::` in the code, with the names of a `{…}` list one by one.
 fn paths(code: &str, module: &str) -> Vec<String> {
     let parent = module.rsplit_once("::").map_or("", |(parent, _)| parent);
     let mut found = Vec::new();
-    for (start, prefix) in [("crate::", String::new()), ("super::", format!("{parent}::"))] {
+    let starts = [("crate::", String::new()), ("super::", format!("{parent}::")), ("self::", format!("{module}::"))];
+    for (start, prefix) in starts {
         for after in code.split(start).skip(1) {
             let end = after.find(|c: char| !(c.is_alphanumeric() || "_:".contains(c))).unwrap_or(after.len());
             let path = format!("{prefix}{}", &after[..end]);

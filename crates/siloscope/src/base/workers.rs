@@ -1,7 +1,19 @@
 //! Threads of our own, only where the caller asks for more than one.
 
+use crate::{Error, Result};
 use rayon::ThreadPool;
 use rayon::prelude::*;
+
+/// Most threads that a caller may ask for.
+pub const MAX_THREADS: usize = 1024;
+
+/// Refuses 0 threads and a number that no machine has.
+pub fn check_threads(threads: usize) -> Result<()> {
+    match (1..=MAX_THREADS).contains(&threads) {
+        true => Ok(()),
+        false => Err(Error::Setting { name: "threads", bounds: "between 1 and 1024", value: threads as f64 }),
+    }
+}
 
 /// Runs loops over independent items; the answer never depends on the number of threads.
 pub struct Workers {

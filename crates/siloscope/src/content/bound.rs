@@ -1,9 +1,9 @@
 //! The silo's wall as a bound of its content: which returns lie on it, which inside, which beyond.
 
-use super::returns::Line;
+use super::silo_points::ScanLine;
 use crate::geometry::sensor::NoiseLaw;
 
-/// Returns within so many standard deviations of the wall belong to the wall.
+/// SiloPoints within so many standard deviations of the wall belong to the wall.
 const WALL_SIGMAS: f64 = 4.0;
 
 /// The cylinder that bounds the surface, and how well it is known.
@@ -61,7 +61,7 @@ impl Bound {
     }
 
     /// Squared radius within which no return of a line can belong to the wall.
-    pub fn inside(&self, line: &Line) -> f32 {
+    pub fn inside(&self, line: &ScanLine) -> f32 {
         self.inside.get(self.step(farthest(&line.depth))).copied().unwrap_or(0.0)
     }
 

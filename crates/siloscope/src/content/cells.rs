@@ -1,15 +1,15 @@
-//! Returns gathered into cells: the wall taken away, each cell's surface told from dust by its median.
+//! SiloPoints gathered into cells: the wall taken away, each cell's surface told from dust by its median.
 
 use super::bound::{Bound, Side};
-use super::doubt::Lever;
 use super::grid::Grid;
-use super::returns::{Line, Returns};
+use super::jacobian::CalibrationJacobian;
+use super::silo_points::{ScanLine, SiloPoints};
 use crate::geometry::sensor::NoiseLaw;
 use crate::stats::robust::{MAD_TO_STD, upper_median_by};
 
-/// Returns farther than so many robust standard deviations from their cell's median are clutter.
+/// SiloPoints farther than so many robust standard deviations from their cell's median are clutter.
 const CLUTTER_SIGMAS: f32 = 4.0;
-/// Returns of which the medians are taken; more add time, not certainty.
+/// SiloPoints of which the medians are taken; more add time, not certainty.
 const SURVEYED: f64 = 12_000.0;
 /// Fewest surveyed returns that make a median.
 const FEWEST: usize = 3;
@@ -28,7 +28,7 @@ struct Places {
 }
 
 impl Places {
-    fn work_out(&mut self, line: &Line, grid: &Grid) {
+    fn work_out(&mut self, line: &ScanLine, grid: &Grid) {
         self.cell.resize(line.len(), 0);
         self.square.resize(line.len(), 0.0);
         let scale = 1.0 / grid.cell() as f32;
@@ -47,7 +47,7 @@ impl Places {
 /// What the returns over one cell say.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Cell {
-    /// Returns that agree with the cell's median.
+    /// SiloPoints that agree with the cell's median.
     pub count: f64,
     /// Their mean point in the silo frame.
     pub mean: [f64; 3],
@@ -61,25 +61,25 @@ impl Cell {
         self.count > 0.0
     }
 
-    fn finish(&mut self, noise: &NoiseLaw, lever: &Lever) {
+    fn finish(&mut self, noise: &NoiseLaw, jacobian: &CalibrationJacobian) {
         if self.count > 0.0 {
             self.mean = self.mean.map(|sum| sum / self.count);
-            let depth = lever.depth(self.mean);
-            self.variance = (noise.sigma(depth) / lever.gain(depth) * self.mean[2] / depth).powi(2) / self.count;
+            let depth = jacobian.depth(self.mean);
+            self.variance = (noise.sigma(depth) / jacobian.gain(depth) * self.mean[2] / depth).powi(2) / self.count;
         }
     }
 }
 
 /// Counts of the whole frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Tally {
+pub struct Counts {
     /// Pixels or points with a measurement.
     pub returns: f64,
-    /// Returns on the cylinder's wall.
+    /// SiloPoints on the cylinder's wall.
     pub wall: f64,
-    /// Returns outside the silo.
+    /// SiloPoints outside the silo.
     pub outside: f64,
-    /// Returns over the surface that float above it.
+    /// SiloPoints over the surface that float above it.
     pub above: f64,
     /// Those of them whose predecessor in the frame also floats, at a like depth: a thing, not dust.
     pub coherent: f64,
@@ -97,17 +97,17 @@ const CLOSED: Window = Window { low: f32::INFINITY, high: f32::NEG_INFINITY };
 
 /// Gathers a frame into cells.
 pub fn gather(
-    returns: &Returns<'_>,
+    returns: &SiloPoints<'_>,
     bound: &Bound,
     grid: &Grid,
     noise: &NoiseLaw,
-    lever: &Lever,
-) -> (Vec<Cell>, Tally) {
+    jacobian: &CalibrationJacobian,
+) -> (Vec<Cell>, Counts) {
     let mut sums = Gathering {
         bound,
         windows: survey(returns, bound, grid, noise),
         cells: vec![Cell::default(); grid.count()],
-        tally: Tally::default(),
+        tally: Counts::default(),
         floating: f32::INFINITY,
     };
     let mut places = Places::default();
@@ -115,11 +115,11 @@ pub fn gather(
         places.work_out(line, grid);
         sums.add(line, &places);
     });
-    sums.cells.iter_mut().for_each(|cell| cell.finish(noise, lever));
+    sums.cells.iter_mut().for_each(|cell| cell.finish(noise, jacobian));
     (sums.cells, sums.tally)
 }
 
-/// Returns one after another over the same cell, not yet added to it: their sum of x, y, z and 1.
+/// SiloPoints one after another over the same cell, not yet added to it: their sum of x, y, z and 1.
 ///
 /// A run is some ten returns long, so single precision loses nothing.
 struct Run {
@@ -133,12 +133,12 @@ struct Gathering<'a> {
     bound: &'a Bound,
     windows: Vec<Window>,
     cells: Vec<Cell>,
-    tally: Tally,
+    tally: Counts,
     floating: f32,
 }
 
 impl Gathering<'_> {
-    fn add(&mut self, line: &Line, places: &Places) {
+    fn add(&mut self, line: &ScanLine, places: &Places) {
         let (inside, mut wall, mut outside) = (self.bound.inside(line), 0, 0);
         let mut run = Run { cell: u32::MAX, window: CLOSED, sum: [0.0; 4] }; // a local one stays in registers
         let points = line.x.iter().zip(&line.y).zip(&line.z).zip(&line.depth);
@@ -195,7 +195,7 @@ impl Gathering<'_> {
 type Sample = (u32, f32, f32);
 
 /// The window of each cell, from every so many returns.
-fn survey(returns: &Returns<'_>, bound: &Bound, grid: &Grid, noise: &NoiseLaw) -> Vec<Window> {
+fn survey(returns: &SiloPoints<'_>, bound: &Bound, grid: &Grid, noise: &NoiseLaw) -> Vec<Window> {
     let stride = (returns.len() as f64 / SURVEYED).sqrt().round().max(1.0) as usize;
     let mut samples: Vec<Sample> = Vec::with_capacity(returns.len() / (stride * stride) + 1);
     let mut places = Places::default();

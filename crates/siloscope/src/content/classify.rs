@@ -1,9 +1,9 @@
 //! Which cells show the content, which the bare cone, and which something else.
 
 use super::cells::Cell;
-use super::doubt::{Covariance, Lever, deviation};
 use super::fit::{Surface, fit, sketch};
 use super::grid::Grid;
+use super::jacobian::{CalibrationJacobian, Covariance, deviation};
 use super::volume::Kind;
 use crate::geometry::vessel::Vessel;
 
@@ -48,7 +48,7 @@ pub struct Floor<'a> {
     /// The silo.
     pub vessel: &'a Vessel,
     /// The pose's derivatives.
-    pub lever: &'a Lever,
+    pub jacobian: &'a CalibrationJacobian,
     /// How well pose, geometry and depth are known.
     pub covariance: &'a Covariance,
     /// How uneven the wall is, metres (standard deviation).
@@ -59,7 +59,7 @@ impl Floor<'_> {
     /// How far a cell's mean lies above the floor, in standard deviations.
     fn sigmas_above(&self, cell: &Cell, grid: &Grid) -> f64 {
         let thickness = self.vessel.floor(mean_radius(cell.mean, grid.cell())) - cell.mean[2];
-        let known = deviation(&self.lever.thickness(cell.mean, self.vessel), self.covariance);
+        let known = deviation(&self.jacobian.thickness(cell.mean, self.vessel), self.covariance);
         let noise = cell.variance + self.wall_std * self.wall_std;
         thickness / (known * known + noise).sqrt()
     }

@@ -2,10 +2,10 @@
 
 use super::bound::Bound;
 use super::cells::{Cell, gather};
-use super::doubt::Lever;
 use super::fit::{Surface, fit, sketch};
 use super::grid::Grid;
-use super::returns::{Returns, Source};
+use super::jacobian::CalibrationJacobian;
+use super::silo_points::{SiloPoints, Source};
 use super::volume::Kind;
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
 use crate::{Error, Result, SiloPose, Vec3};
@@ -51,9 +51,10 @@ impl Relief {
         let centred = Grid { centre: [0.0, 0.0], ..grid };
         let noise = NoiseLaw::uniform(noise);
         let pose = SiloPose::default();
-        let returns = Returns::new(Source::Points(&down), DepthBias::default(), &pose, [0.0; 2]);
+        let returns = SiloPoints::new(Source::Points(&down), DepthBias::default(), &pose, [0.0; 2]);
         let bound = Bound::new(10.0 * extent.reach, [0.0; 2], &noise, 0.0, f64::MIN, [0.0; 2]);
-        let (mut cells, _) = gather(&returns, &bound, &centred, &noise, &Lever::new(&pose, DepthBias::default()));
+        let (mut cells, _) =
+            gather(&returns, &bound, &centred, &noise, &CalibrationJacobian::new(&pose, DepthBias::default()));
         for cell in cells.iter_mut().filter(|c| c.seen()) {
             cell.mean = [cell.mean[0] + cx, cell.mean[1] + cy, cell.mean[2]];
         }

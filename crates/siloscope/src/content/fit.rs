@@ -120,14 +120,14 @@ pub fn sketch(grid: &Grid, cells: &[Cell], take: &[bool]) -> Option<Surface> {
 /// Fits the surface to the cells that `take` names, given a first one; None where they are too few.
 pub fn fit(sketch: &Surface, cells: &[Cell], take: &[bool]) -> Option<Surface> {
     let mut work = Work::new(&sketch.grid, cells, take)?;
-    work.settle(&sketch.heights(&work.cells, cells));
+    work.reweight(&sketch.heights(&work.cells, cells));
     let sums = work.centre(cells, sketch);
     let (roughness, trend) = most_probable(&sums, &work.basis)?;
     let heights = work.heights(&trend);
-    work.unbend(&heights);
+    work.correct_curvature(&heights);
     let slopes = work.slopes(&heights);
     let patch = work.patch(&trend);
-    work.widen(patch);
+    work.inflate_variance(patch);
     let trend = Sums::new(work.basis.functions(), &work.observations).solve(&work.basis, roughness)?;
     Some(work.finish(trend, patch, slopes))
 }
@@ -175,14 +175,14 @@ impl<'a> Work<'a> {
     fn robust(&mut self, roughness: Roughness) -> Option<Trend> {
         let mut trend = Sums::new(self.basis.functions(), &self.observations).solve(&self.basis, roughness)?;
         for _ in 1..ROUNDS {
-            self.settle(&self.fitted(&trend));
+            self.reweight(&self.fitted(&trend));
             trend = Sums::new(self.basis.functions(), &self.observations).solve(&self.basis, roughness)?;
         }
         Some(trend)
     }
 
     /// Variances from the residuals: noise, what the trend leaves, and more for cells that stand out.
-    fn settle(&mut self, fitted: &[f64]) {
+    fn reweight(&mut self, fitted: &[f64]) {
         let residuals = self.residuals(fitted);
         let scatter = scatter(&residuals).powi(2);
         let explained = self.noise.iter().sum::<f64>() / self.noise.len() as f64;
@@ -217,7 +217,7 @@ impl<'a> Work<'a> {
     }
 
     /// Takes from each cell's mean height what the surface's own bend over the cell adds to it: `cell² ∇²z / 24`.
-    fn unbend(&mut self, heights: &[f64]) {
+    fn correct_curvature(&mut self, heights: &[f64]) {
         let grid = self.grid;
         for (o, &i) in self.observations.iter_mut().zip(&self.cells) {
             let (sum, beside) = grid.beside(i).fold((0.0, 0.0), |(sum, n), j| (sum + heights[j], n + 1.0));
@@ -252,7 +252,7 @@ impl<'a> Work<'a> {
     }
 
     /// Deviations that keep together over a patch of cells count once, not once a cell.
-    fn widen(&mut self, patch: f64) {
+    fn inflate_variance(&mut self, patch: f64) {
         for (o, noise) in self.observations.iter_mut().zip(&self.noise) {
             o.variance *= (noise + patch * self.rough) / (noise + self.rough);
         }

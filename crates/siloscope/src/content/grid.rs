@@ -13,7 +13,7 @@ pub struct Grid {
 
 /// Fewest and most cells along a side.
 const SIDES: (usize, usize) = (12, 32);
-/// Returns wanted in a cell.
+/// SiloPoints wanted in a cell.
 const WANTED: f64 = 40.0;
 
 impl Grid {

@@ -1,6 +1,23 @@
 //! The shape of a surface: how steep it lies, whether it is a heap or a funnel, and about which centre.
 
 use super::basis::meeting_point;
+use super::cells::Cell;
+use super::detail;
+use super::fit::Surface;
+use super::trend::Observation;
+use crate::stats::line_fit::LineFit;
+
+/// Shape of the seen part of a surface; heights upwards.
+pub fn shape_of(surface: &Surface, cells: &[Cell], reach: f64) -> Option<Shape> {
+    let sample = |((i, o), [zx, zy]): (&(usize, Observation), &[f64; 2])| {
+        let [x, y, _] = cells[*i].mean;
+        let z = surface.datum + surface.trend.height(&o.row) * surface.grid.reach;
+        let detail = detail::between(&surface.grid, &surface.detail, x, y);
+        Sample { place: [x, y], height: -(z + detail), slope: [-zx, -zy] }
+    };
+    let samples: Vec<Sample> = surface.used.iter().zip(&surface.slopes).map(sample).collect();
+    shape(&samples, surface.grid.centre, reach)
+}
 
 /// A place on the surface with its height (upwards) and slopes.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -154,22 +171,13 @@ impl Profile {
         let (from, to) = (at(FLANK[0]), at(FLANK[1]));
         let inside =
             samples.iter().map(|s| (distance(s, self.centre), s.height)).filter(|p| (from..=to).contains(&p.0));
-        line_slope(inside)
+        let line = LineFit::of(inside.map(|(rho, height)| (rho, height, 1.0)));
+        if line.spread() > 1e-12 { line.slope() } else { 0.0 }
     }
 }
 
 fn distance(s: &Sample, centre: [f64; 2]) -> f64 {
     (s.place[0] - centre[0]).hypot(s.place[1] - centre[1])
-}
-
-/// Slope of the least-squares line; 0 for fewer than two places.
-fn line_slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let (mut n, mut x, mut y, mut xx, mut xy) = (0.0, 0.0, 0.0, 0.0, 0.0);
-    for (a, b) in points {
-        (n, x, y, xx, xy) = (n + 1.0, x + a, y + b, xx + a * a, xy + a * b);
-    }
-    let spread = n * xx - x * x;
-    if spread > 1e-12 { (n * xy - x * y) / spread } else { 0.0 }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ use crate::base::refusal::Refusal;
 use crate::geometry::surface::Cone;
 use crate::shape_tensor::candidates::View;
 use crate::stats::blocks::{blocks, sums};
+use crate::stats::line_fit::LineFit;
 use crate::stats::robust::{MAD_TO_STD, TUKEY, median};
 use crate::{SiloPose, Vec3};
 use nalgebra::{Matrix2, Vector2};
@@ -250,11 +251,7 @@ fn weighted_mean(places: &[(Place, f64)]) -> Option<f64> {
 
 /// Line ρ = m(z_a − z) by weighted least squares; None where it is no cone.
 fn weighted_cone(places: &[(Place, f64)]) -> Option<Cone> {
-    let mut sums = [0.0; 5];
-    for (p, w) in places {
-        sums.iter_mut().zip([1.0, p.z, p.rho, p.z * p.z, p.z * p.rho]).for_each(|(sum, term)| *sum += w * term);
-    }
-    let [n, z, rho, zz, zrho] = sums;
-    let slope = -(n * zrho - z * rho) / (n * zz - z * z);
-    SLOPES.contains(&slope).then(|| Cone { slope, apex: (rho + slope * z) / (n * slope) })
+    let line = LineFit::of(places.iter().map(|(p, w)| (p.z, p.rho, *w)));
+    let slope = -line.slope();
+    SLOPES.contains(&slope).then(|| Cone { slope, apex: line.root() })
 }

@@ -2,6 +2,8 @@
 
 pub mod blocks;
 pub mod eigen;
+pub mod kd_tree;
+pub mod line_fit;
 pub mod nearest;
 pub mod neighbours;
 pub mod robust;

@@ -1,12 +1,9 @@
-//! The k nearest neighbours of every point: a k-d tree whose leaves are asked together.
+//! The k nearest neighbours of every point: the leaves of a k-d tree, whose points are asked together.
 
 use crate::base::workers::Workers;
+use crate::stats::kd_tree::KdTree;
 use crate::{Error, Result, Vec3};
-use std::cmp::Ordering;
-use std::ops::Range;
 
-/// Points in a leaf of the tree.
-const LEAF: usize = 16;
 /// Bounds of the number of neighbours: fewer can't carry a cubic, more is no neighbourhood.
 pub const NEIGHBOURS: std::ops::RangeInclusive<usize> = 6..=500;
 
@@ -58,25 +55,16 @@ pub fn nearest_neighbours(points: &[Vec3], k: usize, workers: &Workers) -> Resul
     if k == 0 {
         return Ok(Neighbours::default());
     }
-    let tree = Tree::new(points, workers);
-    let by_leaf = workers.map(tree.leaves(), |leaf| tree.neighbours_of_leaf(leaf, k));
+    let tree = KdTree::new(points.iter().copied(), workers);
+    let by_leaf = workers.map(tree.leaves(), |leaf| neighbours_of_leaf(&tree, leaf, k));
     let mut index = vec![0; points.len() * k];
     for (leaf, neighbours) in by_leaf.iter().enumerate() {
-        for (id, row) in tree.ids_of_leaf(leaf).iter().zip(neighbours.chunks_exact(k)) {
+        for (id, row) in tree.ids()[tree.range_of_leaf(leaf)].iter().zip(neighbours.chunks_exact(k)) {
             let start = *id as usize * k;
             index.get_mut(start..start + k).into_iter().for_each(|out| out.copy_from_slice(row));
         }
     }
     Ok(Neighbours { k, index })
-}
-
-/// A balanced k-d tree: node j of level L holds the points from j·n/2^L to (j+1)·n/2^L of the reordered cloud.
-struct Tree {
-    ids: Vec<u32>,
-    points: Vec<Vec3>,
-    /// Bounding boxes of the nodes, level by level from the root.
-    boxes: Vec<Bounds>,
-    levels: u32,
 }
 
 /// A neighbour on trial: the bits of its squared distance, which are in the same order as the number, and its index.
@@ -86,88 +74,35 @@ fn trial(squared: f64, id: u32) -> Found {
     (Found::from(squared.to_bits()) << 32) | Found::from(id)
 }
 
-impl Tree {
-    fn new(points: &[Vec3], workers: &Workers) -> Self {
-        let n = points.len();
-        let levels = (0..).find(|levels| n >> levels <= LEAF).unwrap_or(0);
-        let mut ids: Vec<u32> = (0..n as u32).collect();
-        split(&mut ids, points, Node { n, levels, level: 0, j: 0 }, workers);
-        let points: Vec<Vec3> = ids.iter().map(|id| points[*id as usize]).collect();
-        let mut tree = Self { ids, points, boxes: Vec::new(), levels };
-        tree.boxes = tree.bounds();
-        tree
-    }
-
-    fn bounds(&self) -> Vec<Bounds> {
-        let inner = self.leaves() - 1;
-        let mut boxes = vec![Bounds::of(&[]); inner];
-        boxes.extend((0..self.leaves()).map(|leaf| Bounds::of(&self.points[self.range(self.levels, leaf)])));
-        for node in (0..inner).rev() {
-            boxes[node] = boxes[2 * node + 1].union(&boxes[2 * node + 2]);
-        }
-        boxes
-    }
-
-    fn leaves(&self) -> usize {
-        1 << self.levels
-    }
-
-    fn range(&self, level: u32, node: usize) -> Range<usize> {
-        part(self.ids.len(), level, node)..part(self.ids.len(), level, node + 1)
-    }
-
-    fn ids_of_leaf(&self, leaf: usize) -> &[u32] {
-        &self.ids[self.range(self.levels, leaf)]
-    }
-
-    /// The k nearest neighbours of every point of a leaf, one after the other.
-    ///
-    /// A point's k-th neighbour is no farther than that of another point plus the step between the two, so only the
-    /// first point of a leaf has to look for a bound.
-    fn neighbours_of_leaf(&self, leaf: usize, k: usize) -> Vec<u32> {
-        let range = self.range(self.levels, leaf);
-        let mut result = Vec::with_capacity(range.len() * k);
-        let (mut found, mut open) = (Vec::new(), Vec::new());
-        let mut done: Vec<(Vec3, f64)> = Vec::with_capacity(range.len());
-        for i in range {
-            let p = self.points[i];
-            let reach = done.iter().map(|(q, reach)| reach + (p - q).norm()).min_by(f64::total_cmp);
-            let bound = reach.map_or_else(|| self.first_bound(leaf, k, &p), |reach| reach.powi(2) * (1.0 + 1e-12));
-            self.within(i, bound, &mut open, &mut found);
-            done.push((p, keep_nearest(&mut found, k)));
-            result.extend(found.iter().map(|found| *found as u32));
-        }
-        result
-    }
-
-    /// Squared distance within which k others surely lie: the farthest of the smallest node around that holds them.
-    fn first_bound(&self, leaf: usize, k: usize, p: &Vec3) -> f64 {
-        let around = |up: u32| self.range(self.levels - up, leaf >> up);
-        let up = (0..self.levels).find(|up| around(*up).len() > k).unwrap_or(self.levels);
-        self.points[around(up)].iter().map(|q| (q - p).norm_squared()).fold(0.0, f64::max)
-    }
-
-    /// All points but point `i` itself within the squared distance `bound` of it.
-    fn within(&self, i: usize, bound: f64, open: &mut Vec<(u32, usize)>, found: &mut Vec<Found>) {
-        let p = self.points[i];
+/// The k nearest neighbours of every point of a leaf, one after the other.
+///
+/// A point's k-th neighbour is no farther than that of another point plus the step between the two, so only the
+/// first point of a leaf has to look for a bound.
+fn neighbours_of_leaf(tree: &KdTree, leaf: usize, k: usize) -> Vec<u32> {
+    let range = tree.range_of_leaf(leaf);
+    let mut result = Vec::with_capacity(range.len() * k);
+    let (mut found, mut open) = (Vec::new(), Vec::new());
+    let mut done: Vec<(Vec3, f64)> = Vec::with_capacity(range.len());
+    for i in range {
+        let p = tree.points()[i];
+        let reach = done.iter().map(|(q, reach)| reach + (p - q).norm()).min_by(f64::total_cmp);
+        let bound = reach.map_or_else(|| first_bound(tree, leaf, k, &p), |reach| reach.powi(2) * (1.0 + 1e-12));
         found.clear();
-        open.push((0, 0));
-        while let Some((level, node)) = open.pop() {
-            if self.boxes[(1 << level) - 1 + node].squared_distance(&p) > bound {
-                continue;
+        tree.visit_within(&p, bound, &mut open, |j, squared| {
+            if j != i {
+                found.push(trial(squared, tree.ids()[j]));
             }
-            if level < self.levels {
-                open.extend([(level + 1, 2 * node + 1), (level + 1, 2 * node)]);
-                continue;
-            }
-            for j in self.range(level, node) {
-                let squared = (self.points[j] - p).norm_squared();
-                if squared <= bound && j != i {
-                    found.push(trial(squared, self.ids[j]));
-                }
-            }
-        }
+        });
+        done.push((p, keep_nearest(&mut found, k)));
+        result.extend(found.iter().map(|found| *found as u32));
     }
+    result
+}
+
+/// Squared distance within which k others surely lie: the farthest of the smallest node around that holds them.
+fn first_bound(tree: &KdTree, leaf: usize, k: usize, p: &Vec3) -> f64 {
+    let around = tree.smallest_node_around(leaf, k);
+    tree.points()[around].iter().map(|q| (q - p).norm_squared()).fold(0.0, f64::max)
 }
 
 /// Keeps the k nearest in order and returns the distance of the last.
@@ -178,64 +113,6 @@ fn keep_nearest(found: &mut Vec<Found>, k: usize) -> f64 {
     }
     found.sort_unstable();
     found.last().map_or(0.0, |found| f64::from_bits((found >> 32) as u64).sqrt())
-}
-
-/// Where node `node` of a level begins among n points.
-fn part(n: usize, level: u32, node: usize) -> usize {
-    (n * node) >> level
-}
-
-/// Node j of a level, in a tree of `levels` levels over n points.
-#[derive(Clone, Copy)]
-struct Node {
-    n: usize,
-    levels: u32,
-    level: u32,
-    j: usize,
-}
-
-/// Splits a node's points halfway along the widest side of their box, down to the leaves.
-fn split(ids: &mut [u32], points: &[Vec3], node: Node, workers: &Workers) {
-    if node.level == node.levels {
-        return;
-    }
-    let bounds = ids.iter().fold(Bounds::of(&[]), |b, id| b.with(&points[*id as usize]));
-    let axis = (bounds.high - bounds.low).imax();
-    let half = part(node.n, node.level + 1, 2 * node.j + 1) - part(node.n, node.level, node.j);
-    let along = |id: &u32| (points[*id as usize][axis], *id);
-    ids.select_nth_unstable_by(half, |a, b| along(a).partial_cmp(&along(b)).unwrap_or(Ordering::Equal));
-    let (low, high) = ids.split_at_mut(half);
-    let child = |right: usize| Node { level: node.level + 1, j: 2 * node.j + right, ..node };
-    workers.join(|| split(low, points, child(0), workers), || split(high, points, child(1), workers));
-}
-
-#[derive(Clone, Copy)]
-struct Bounds {
-    low: Vec3,
-    high: Vec3,
-}
-
-impl Bounds {
-    fn of(points: &[Vec3]) -> Self {
-        let nothing = Self { low: Vec3::repeat(f64::INFINITY), high: Vec3::repeat(f64::NEG_INFINITY) };
-        points.iter().fold(nothing, |bounds, p| bounds.with(p))
-    }
-
-    fn with(self, p: &Vec3) -> Self {
-        Self { low: self.low.inf(p), high: self.high.sup(p) }
-    }
-
-    fn union(&self, other: &Self) -> Self {
-        Self { low: self.low.inf(&other.low), high: self.high.sup(&other.high) }
-    }
-
-    /// Squared distance from a point to the box.
-    fn squared_distance(&self, p: &Vec3) -> f64 {
-        let gap = |low: f64, high: f64, p: f64| (low - p).max(p - high).max(0.0);
-        let (x, y, z) =
-            (gap(self.low.x, self.high.x, p.x), gap(self.low.y, self.high.y, p.y), gap(self.low.z, self.high.z, p.z));
-        x * x + y * y + z * z
-    }
 }
 
 #[cfg(test)]

@@ -17,7 +17,7 @@ pub enum Source<'a> {
 
 /// A frame whose depths are corrected for the sensor's bias and moved into the silo frame.
 #[derive(Debug)]
-pub struct Returns<'a> {
+pub struct SiloPoints<'a> {
     source: Source<'a>,
     /// x/z of each column and y/z of each row of a depth image without distortion.
     axes: Option<[Vec<f32>; 2]>,
@@ -29,7 +29,7 @@ pub struct Returns<'a> {
 
 /// Points of one line of pixels in the silo frame. A depth of 0 is no measurement.
 #[derive(Debug, Default)]
-pub struct Line {
+pub struct ScanLine {
     /// x of each point.
     pub x: Vec<f32>,
     /// y of each point.
@@ -41,7 +41,7 @@ pub struct Line {
     rays: [Vec<f32>; 2],
 }
 
-impl Line {
+impl ScanLine {
     fn resize(&mut self, len: usize) {
         let [a, b] = &mut self.rays;
         for column in [&mut self.x, &mut self.y, &mut self.z, &mut self.depth, a, b] {
@@ -63,7 +63,7 @@ impl Line {
 /// Points that are taken as one line.
 const CHUNK: usize = 640;
 
-impl<'a> Returns<'a> {
+impl<'a> SiloPoints<'a> {
     /// Puts a frame into the silo frame by the camera's pose.
     ///
     /// In an oval silo (`ovality` c, s) x and y are divided by 1 + c cos 2φ + s sin 2φ, which makes its wall round.
@@ -91,10 +91,10 @@ impl<'a> Returns<'a> {
     }
 
     /// Calls `see` for every `stride`-th line, with every `stride`-th pixel of it.
-    pub fn visit(&self, stride: usize, mut see: impl FnMut(&Line)) {
+    pub fn visit(&self, stride: usize, mut see: impl FnMut(&ScanLine)) {
         let stride = stride.max(1);
-        let mut line = Line::default();
-        let mut finish = |line: &mut Line| {
+        let mut line = ScanLine::default();
+        let mut finish = |line: &mut ScanLine| {
             self.place(line);
             see(line);
         };
@@ -126,7 +126,7 @@ impl<'a> Returns<'a> {
     }
 
     /// From measured depths and rays to true depths and points.
-    fn place(&self, line: &mut Line) {
+    fn place(&self, line: &mut ScanLine) {
         self.correct(&mut line.depth);
         let [rx, ry] = &line.rays;
         let [tx, ty] = self.translation;
@@ -142,7 +142,7 @@ impl<'a> Returns<'a> {
     }
 
     /// Makes an oval silo round: cos 2φ = (x² - y²)/r², sin 2φ = 2xy/r².
-    fn round(&self, line: &mut Line) {
+    fn round(&self, line: &mut ScanLine) {
         let [c, s] = self.ovality;
         if c == 0.0 && s == 0.0 {
             return;
@@ -174,14 +174,14 @@ fn copy(to: &mut [f32], from: &[f32], stride: usize) {
     }
 }
 
-fn load_rays<'r>(line: &mut Line, rays: impl Iterator<Item = &'r [f64; 2]>) {
+fn load_rays<'r>(line: &mut ScanLine, rays: impl Iterator<Item = &'r [f64; 2]>) {
     let [x, y] = &mut line.rays;
     for ((x, y), ray) in x.iter_mut().zip(y).zip(rays) {
         (*x, *y) = (ray[0] as f32, ray[1] as f32);
     }
 }
 
-fn load_points<'p>(line: &mut Line, points: impl Iterator<Item = &'p [f32; 3]>) {
+fn load_points<'p>(line: &mut ScanLine, points: impl Iterator<Item = &'p [f32; 3]>) {
     let [x, y] = &mut line.rays;
     for (((x, y), depth), &[px, py, pz]) in x.iter_mut().zip(y).zip(&mut line.depth).zip(points) {
         let measured = pz > 0.0 && px.is_finite() && py.is_finite();
@@ -201,7 +201,7 @@ mod tests {
 
     fn all(source: Source<'_>, bias: DepthBias, stride: usize) -> Vec<[f32; 4]> {
         let mut points = Vec::new();
-        let returns = Returns::new(source, bias, &POSE, [0.0; 2]);
+        let returns = SiloPoints::new(source, bias, &POSE, [0.0; 2]);
         returns.visit(stride, |l| (0..l.len()).for_each(|i| points.push([l.x[i], l.y[i], l.z[i], l.depth[i]])));
         points
     }

@@ -1,6 +1,6 @@
 //! How much of the silo the sensor sees at all.
 
-use super::returns::{Returns, Source};
+use super::silo_points::{SiloPoints, Source};
 use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::surface::Part;
@@ -9,7 +9,7 @@ use crate::{SiloPose, Vec3};
 
 /// What the sensor sees of what it should.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Sight {
+pub struct Visibility {
     /// Share of the pixels or points with a measurement.
     pub measured: f64,
     /// Share of the image's tiles that look at the silo within the sensor's range and show next to nothing.
@@ -24,18 +24,24 @@ const TOO_NEAR: f64 = 0.5;
 const TILES: [usize; 2] = [16, 12];
 /// A tile with a smaller share of measurements is blind.
 const BLIND: f64 = 0.02;
-/// Every so manieth pixel is looked at.
+/// Pixel stride.
 const STRIDE: usize = 4;
 
 /// Looks at the raw frame; `range` is what the sensor can measure.
-pub fn sight(source: Source<'_>, returns: &Returns<'_>, vessel: &Vessel, pose: &SiloPose, range: [f64; 2]) -> Sight {
+pub fn visibility(
+    source: Source<'_>,
+    returns: &SiloPoints<'_>,
+    vessel: &Vessel,
+    pose: &SiloPose,
+    range: [f64; 2],
+) -> Visibility {
     let (mut measured, mut near, mut all) = (0.0, 0.0, 0.0);
     returns.visit(STRIDE, |line| {
         all += line.len() as f64;
         measured += line.depth.iter().filter(|&&d| d > 0.0).count() as f64;
         near += line.depth.iter().filter(|&&d| d > 0.0 && f64::from(d) < TOO_NEAR * range[0]).count() as f64;
     });
-    Sight {
+    Visibility {
         measured: measured / f64::max(all, 1.0),
         blind: if let Source::Depth(image) = source { blind(&image, vessel, pose, range) } else { 0.0 },
         near: near / f64::max(measured, 1.0),

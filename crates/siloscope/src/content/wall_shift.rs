@@ -1,8 +1,8 @@
 //! Whether the wall still lies where the calibration has it.
 
-use super::doubt::{Covariance, DEPTH, Lever, POSE};
 use super::fit::Surface;
-use super::returns::Returns;
+use super::jacobian::{CalibrationJacobian, Covariance, DEPTH, POSE};
+use super::silo_points::SiloPoints;
 use crate::geometry::sensor::NoiseLaw;
 use crate::geometry::vessel::Vessel;
 use crate::stats::robust::tukey_weight;
@@ -21,9 +21,9 @@ pub struct Shift {
     pub left: f64,
 }
 
-/// Returns looked at.
+/// SiloPoints looked at.
 const SAMPLED: f64 = 2_500.0;
-/// Returns farther from the wall than this share of the radius don't belong to it.
+/// SiloPoints farther from the wall than this share of the radius don't belong to it.
 const GATE: f64 = 0.08;
 /// Wall closer above the content than this share of the radius may be content.
 const CLEARANCE: f64 = 0.1;
@@ -51,14 +51,14 @@ impl Residual {
 
 /// Fits the pose's change to the returns near the cylinder's wall; None where they are too few to tell.
 pub fn shift(
-    returns: &Returns<'_>,
+    returns: &SiloPoints<'_>,
     vessel: &Vessel,
-    lever: &Lever,
+    jacobian: &CalibrationJacobian,
     noise: &NoiseLaw,
     covariance: &Covariance,
     surface: Option<&Surface>,
 ) -> Option<Shift> {
-    let residuals = near_wall(returns, vessel, lever, noise, surface);
+    let residuals = near_wall(returns, vessel, jacobian, noise, surface);
     if residuals.len() < FEWEST {
         return None;
     }
@@ -95,9 +95,9 @@ fn rms(residuals: &[Residual], change: &Vector4<f64>) -> f64 {
 }
 
 fn near_wall(
-    returns: &Returns<'_>,
+    returns: &SiloPoints<'_>,
     vessel: &Vessel,
-    lever: &Lever,
+    jacobian: &CalibrationJacobian,
     noise: &NoiseLaw,
     surface: Option<&Surface>,
 ) -> Vec<Residual> {
@@ -107,7 +107,7 @@ fn near_wall(
         for i in (0..line.len()).filter(|&i| line.depth[i] > 0.0) {
             let point = [line.x[i], line.y[i], line.z[i]].map(f64::from);
             if on_cylinder(vessel, surface, point) {
-                residuals.push(residual(vessel, lever, noise, point, f64::from(line.depth[i])));
+                residuals.push(residual(vessel, jacobian, noise, point, f64::from(line.depth[i])));
             }
         }
     });
@@ -121,10 +121,16 @@ fn on_cylinder(vessel: &Vessel, surface: Option<&Surface>, [x, y, z]: [f64; 3]) 
     near && surface.is_none_or(|s| s.height(x, y) - z >= CLEARANCE * vessel.radius)
 }
 
-fn residual(vessel: &Vessel, lever: &Lever, noise: &NoiseLaw, point: [f64; 3], depth: f64) -> Residual {
+fn residual(
+    vessel: &Vessel,
+    jacobian: &CalibrationJacobian,
+    noise: &NoiseLaw,
+    point: [f64; 3],
+    depth: f64,
+) -> Residual {
     let radius = point[0].hypot(point[1]);
     let out = [point[0] / radius, point[1] / radius];
-    let shifts = lever.shifts(point);
+    let shifts = jacobian.shifts(point);
     let along = |k: usize| out[0] * shifts[k][0] + out[1] * shifts[k][1];
     let grazing = along(DEPTH.start).abs() * noise.sigma(depth);
     Residual {

@@ -7,14 +7,20 @@
 
 use super::bound::{Bound, STEP, Side};
 use super::cells::Cell;
-use super::doubt::Lever;
 use super::grid::Grid;
+use super::jacobian::CalibrationJacobian;
 use crate::geometry::sensor::NoiseLaw;
 
 /// Takes the drift out of the cells' means.
-pub fn settle(cells: &mut [Cell], grid: &Grid, bound: &Bound, noise: &NoiseLaw, lever: &Lever) {
+pub fn remove_cell_bias(
+    cells: &mut [Cell],
+    grid: &Grid,
+    bound: &Bound,
+    noise: &NoiseLaw,
+    jacobian: &CalibrationJacobian,
+) {
     let whole: Vec<bool> = (0..cells.len()).map(|i| clears(bound, grid.middle(i), grid.cell(), &cells[i])).collect();
-    let drifts: Vec<[f64; 3]> = (0..cells.len()).map(|i| drift(i, cells, &whole, grid, noise, lever)).collect();
+    let drifts: Vec<[f64; 3]> = (0..cells.len()).map(|i| drift(i, cells, &whole, grid, noise, jacobian)).collect();
     for (cell, drift) in cells.iter_mut().zip(drifts) {
         cell.mean = [0, 1, 2].map(|k| cell.mean[k] - drift[k]);
     }
@@ -30,7 +36,14 @@ fn clears(bound: &Bound, [x, y]: [f64; 2], side: f64, cell: &Cell) -> bool {
 }
 
 /// How far a cell's mean is off, metres.
-fn drift(i: usize, cells: &[Cell], whole: &[bool], grid: &Grid, noise: &NoiseLaw, lever: &Lever) -> [f64; 3] {
+fn drift(
+    i: usize,
+    cells: &[Cell],
+    whole: &[bool],
+    grid: &Grid,
+    noise: &NoiseLaw,
+    jacobian: &CalibrationJacobian,
+) -> [f64; 3] {
     let cell = &cells[i];
     let (column, row) = (i % grid.side, i / grid.side);
     if !cell.seen() || !whole[i] {
@@ -39,14 +52,14 @@ fn drift(i: usize, cells: &[Cell], whole: &[bool], grid: &Grid, noise: &NoiseLaw
     let side = |there: bool, j: usize| if there { density(cell, cells.get(j), whole.get(j)) } else { cell.count };
     let across = side(column + 1 < grid.side, i + 1) - side(column > 0, i.wrapping_sub(1));
     let along = side(row + 1 < grid.side, i + grid.side) - side(row > 0, i.wrapping_sub(grid.side));
-    let ray = lever.ray(cell.mean);
-    let depth = lever.depth(cell.mean);
-    let sigma = noise.sigma(depth) / lever.gain(depth);
+    let ray = jacobian.ray(cell.mean);
+    let depth = jacobian.depth(cell.mean);
+    let sigma = noise.sigma(depth) / jacobian.gain(depth);
     let mean = -sigma * sigma * (ray[0] * across + ray[1] * along) / (grid.cell() * cell.count);
     ray.map(|r| r * mean.clamp(-sigma, sigma))
 }
 
-/// Returns a cell at the side between a cell and its neighbour: where one of them is cut by the edge of the view, the
+/// SiloPoints a cell at the side between a cell and its neighbour: where one of them is cut by the edge of the view, the
 /// side has what the fuller one has; beyond the edge it has none. A neighbour that the wall cuts off tells nothing.
 fn density(cell: &Cell, beside: Option<&Cell>, whole: Option<&bool>) -> f64 {
     match (beside, whole) {
@@ -61,7 +74,7 @@ fn density(cell: &Cell, beside: Option<&Cell>, whole: Option<&bool>) -> f64 {
 mod tests {
     use super::*;
     use crate::content::cells::gather;
-    use crate::content::returns::{Returns, Source};
+    use crate::content::silo_points::{SiloPoints, Source};
     use crate::geometry::depth_image::DepthImage;
     use crate::geometry::sensor::DepthBias;
     use crate::{Camera, Distortion, SiloPose};
@@ -87,13 +100,13 @@ mod tests {
             (camera.rays().iter()).map(|[x, _]| (3.0 / (1.0 - 0.5 * x) + SIGMA * normal(&mut state)) as f32).collect();
         let (pose, noise) = (SiloPose::default(), NoiseLaw::uniform(SIGMA));
         let Ok(image) = DepthImage::new(&depth, &camera, None) else { panic!("a frame") };
-        let returns = Returns::new(Source::Depth(image), DepthBias::default(), &pose, [0.0; 2]);
+        let returns = SiloPoints::new(Source::Depth(image), DepthBias::default(), &pose, [0.0; 2]);
         let grid = Grid { centre: [0.0; 2], reach: 3.0, side: 32 };
         let bound = Bound::new(6.0, [0.0; 2], &noise, 10.0, 0.0, [0.0; 2]);
-        let lever = Lever::new(&pose, DepthBias::default());
-        let (mut cells, _) = gather(&returns, &bound, &grid, &noise, &lever);
+        let jacobian = CalibrationJacobian::new(&pose, DepthBias::default());
+        let (mut cells, _) = gather(&returns, &bound, &grid, &noise, &jacobian);
         let before = slope(&cells);
-        settle(&mut cells, &grid, &bound, &noise, &lever);
+        remove_cell_bias(&mut cells, &grid, &bound, &noise, &jacobian);
         [before, slope(&cells)]
     }
 

@@ -24,14 +24,14 @@ pub const DEPTH: std::ops::Range<usize> = 7..10;
 
 /// The pose's rotation and its derivatives, and the depth bias.
 #[derive(Debug, Clone)]
-pub struct Lever {
+pub struct CalibrationJacobian {
     bias: DepthBias,
     rotation: Matrix3<f64>,
     turned: [Matrix3<f64>; 2],
     translation: Vector3<f64>,
 }
 
-impl Lever {
+impl CalibrationJacobian {
     /// Works out the matrices of a pose.
     pub fn new(pose: &SiloPose, bias: DepthBias) -> Self {
         Self {
@@ -145,7 +145,7 @@ mod tests {
             let pose = SiloPose { r_x: 0.1, r_y: -0.2, t_x: 0.4, t_y: 0.1 };
             let (p, v) = moved(&Parameters::zeros(), [x, y], d);
             prop_assume!(p[0].hypot(p[1]) > 0.05);
-            let by = Lever::new(&pose, BIAS).thickness(p, &v)[k];
+            let by = CalibrationJacobian::new(&pose, BIAS).thickness(p, &v)[k];
             let h = 1e-6;
             let thickness = |step: f64| {
                 let mut change = Parameters::zeros();
