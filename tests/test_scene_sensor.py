@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from siloscope import Camera, _core
-from siloscope.simulation import ASTRA_S, Defects, Feed, Scene, SensorModel, SimulatedFrame
-from siloscope.simulation.scenarios import SILO2
+from siloscope import Camera, UsageError, _core
+from siloscope.simulation import ASTRA, ASTRA_S, Defects, Feed, Scene, SensorModel, SimulatedFrame, true_camera
+from siloscope.simulation.scenarios import SILO1, SILO2
 
 CAMERA = Camera(width=320, height=240, fx=285.0, fy=285.0, cx=159.5, cy=119.5)
 SCENE = replace(SILO2, camera=CAMERA, feed=Feed("funnel", 0.3))
@@ -167,3 +167,35 @@ def test_the_binding_takes_any_layout_and_refuses_arrays_that_do_not_belong_toge
     for parts in [(depth[:-1], labels, normals), (depth[:0], labels, normals[:0]), (depth, labels, normals[:, :2])]:
         with pytest.raises(ValueError, match=r"normals|depth"):
             _core.measure_depth(ASTRA_S, CAMERA, *parts, 1, 1)
+
+
+def test_light_that_goes_round_lengthens_what_lies_in_a_hollow() -> None:
+    silo = replace(SILO1, feed=None, sensor=SensorModel(multipath=0.2)).render()
+    error = (silo.measured - silo.depth) / silo.depth
+    assert 0.01 < error.mean() < 0.04
+    assert error.min() > 0.0
+    plane = replace(SILO1, world="wall", feed=None, sensor=SensorModel(multipath=0.2)).render()
+    np.testing.assert_array_equal(plane.measured, plane.depth)
+
+
+@pytest.mark.parametrize(("known", "f", "c", "k1"), [("calibrated", 0.002, 1.0, 0.003), ("nominal", 0.02, 6.4, 0.03)])
+def test_cameras_are_off_by_what_is_said_of_them(known: str, f: float, c: float, k1: float) -> None:
+    cameras = [true_camera(ASTRA, known, seed) for seed in range(400)]
+    rows = np.array(
+        [(d.fx / 570.3 - 1, d.fy / 570.3 - 1, d.cx - 319.5, d.cy - 239.5, d.distortion[0]) for d in cameras]
+    )
+    np.testing.assert_allclose(rows.std(axis=0), [f, f, c, c, k1], rtol=0.15)
+    assert np.abs(np.corrcoef(rows.T) - np.eye(5)).max() < 0.2
+    assert true_camera(ASTRA, known, 3) == cameras[3]
+    assert true_camera(ASTRA, "exact", 3) == ASTRA
+    with pytest.raises(UsageError, match="calibrated"):
+        true_camera(ASTRA, "guessed", 0)
+
+
+def test_a_frame_brings_the_camera_that_is_told() -> None:
+    true = true_camera(ASTRA, "calibrated", 4)
+    frame = replace(SILO1, camera=true, told=ASTRA).render()
+    assert frame.frame().camera == ASTRA
+    assert frame.camera == true
+    assert "told" in frame.scene.to_dict()
+    assert "told" not in SILO1.to_dict()

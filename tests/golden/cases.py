@@ -20,7 +20,7 @@ from siloscope import Camera, Frame, sensors
 from siloscope.reproduction.challenges import complex_feed, feeds
 from siloscope.reproduction.discharges import perfect, perturbed, real
 from siloscope.reproduction.sensor_trials import accelerometer
-from siloscope.simulation import ASTRA_S, DEFECTS, PERFECT, Feed, Scene, Silo, defects
+from siloscope.simulation import ALL, ASTRA_S, PERFECT, Feed, Scene, Silo, defects
 from siloscope.simulation.metrics import LABELS
 from siloscope.simulation.scenarios import SCENARIOS, random_big_scene, random_scene, scenario
 from siloscope.simulation.stand_ins import FOUR_SENSORS
@@ -376,7 +376,7 @@ def cases() -> dict[str, Case]:
             *_each("paper/real", paper_real, range(4), range(8)),
             *_each("paper/feed", feed_shape, list(feeds(Silo(1.0, 1.0, 1.0))), range(6)),
             *_each("paper/sensors", four_sensors, range(4), range(1, 4)),
-            *_each("unseen/defects", unseen_defects, [*DEFECTS, "all"], range(200, 204)),
+            *_each("unseen/defects", unseen_defects, [*ALL, "all"], range(200, 204)),
             *_each("unseen/outlet", outlet, range(220, 228)),
             *_each("unseen/random", unseen, range(100)),
         ]

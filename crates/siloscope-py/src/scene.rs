@@ -7,7 +7,8 @@ use siloscope::Vec3;
 use siloscope_scene::feed::{Base, Lumps, Shape};
 use siloscope_scene::rooms::{Noise, Room, Sphere};
 use siloscope_scene::{
-    Bar, Bundle, Corrugation, Dent, Exact, Feed, Film, Rathole, Relief, Seams, Sensor, Silo, SiloWorld, Wall, World,
+    Bar, Bend, Bottom, Bundle, Corrugation, Courses, Dent, Exact, Feed, Film, Rathole, Relief, Seams, Sensor, Silo,
+    SiloWorld, Wall, World,
 };
 
 type Frame<'py> = (Bound<'py, PyArray1<f64>>, Bound<'py, PyArray1<u8>>, Bound<'py, PyArray2<f64>>);
@@ -90,13 +91,23 @@ fn feed_heights<'py>(
     if places.as_array().ncols() != 2 {
         return Err(convert::value_error("places must have the shape (number of places, 2)"));
     }
-    let wall = |r: f64| if r <= silo.radius { silo.cone_height * r / silo.radius } else { f64::INFINITY };
+    let wall = |x: f64, y: f64| match x.hypot(y) {
+        0.0 => silo.floor_height(0.0, (1.0, 0.0)),
+        r if r <= silo.radius => silo.floor_height(r, (x / r, y / r)),
+        _ => f64::INFINITY,
+    };
     let height = |x: f64, y: f64| {
         let surface = feed.as_ref().map_or(f64::NAN, |feed| feed.height(x, y));
-        if surface > wall(x.hypot(y)) { surface } else { f64::NAN }
+        if surface > wall(x, y) { surface } else { f64::NAN }
     };
     let heights = places.as_array().rows().into_iter().map(|p| height(p[0], p[1])).collect();
     Ok(PyArray1::from_vec(py, heights))
+}
+
+/// Volume of cylinder and bottom down to the vertex, m³.
+#[pyfunction]
+fn silo_capacity(silo: &Bound<'_, PyAny>) -> PyResult<f64> {
+    self::silo(silo).map(|silo| silo.capacity())
 }
 
 /// Raises `ValueError` naming the field where a silo or its feed can't be.
@@ -170,7 +181,10 @@ fn silo_world(scene: &Bound<'_, PyAny>, silo: Silo) -> PyResult<SiloWorld> {
     let feed = feed(&scene.getattr("feed")?, &silo)?;
     let defects = scene.getattr("defects")?;
     if defects.is_none() {
-        return Ok(SiloWorld { silo, wall: None, feed, clutter: vec![] });
+        let relief = Relief { courses: steps(&silo), ..even(&silo) };
+        let stepped = !relief.courses.0.is_empty();
+        let wall = stepped.then(|| Wall::new(&silo, relief, 0.0, 0.0)).transpose().map_err(convert::value_error)?;
+        return Ok(SiloWorld { silo, wall, feed, clutter: vec![] });
     }
     let plan = defects.call_method1("resolved", (scene.getattr("silo")?,))?;
     Ok(SiloWorld { wall: wall(&plan, &silo)?, clutter: clutter(&plan)?, silo, feed })
@@ -179,13 +193,13 @@ fn silo_world(scene: &Bound<'_, PyAny>, silo: Silo) -> PyResult<SiloWorld> {
 /// Reads the wall of a resolved `siloscope.simulation.Defects`; None where it is perfect.
 fn wall(plan: &Bound<'_, PyAny>, silo: &Silo) -> PyResult<Option<Wall>> {
     let relief = Relief {
-        radius: silo.radius,
-        bottom: silo.bottom(),
-        top: silo.top,
+        courses: steps(silo),
+        bend: bend(plan)?,
         corrugation: corrugation(plan)?,
         seams: seams(plan)?,
         dents: dents(plan)?,
         films: films(plan)?,
+        ..even(silo)
     };
     let ovality = number(plan, "ovality")?;
     if relief.is_flat() && ovality == 0.0 {
@@ -193,6 +207,21 @@ fn wall(plan: &Bound<'_, PyAny>, silo: &Silo) -> PyResult<Option<Wall>> {
     }
     let wall = Wall::new(silo, relief, ovality, number(plan, "ovality_azimuth")?);
     wall.map(Some).map_err(convert::value_error)
+}
+
+/// An even wall of the silo's lengths.
+fn even(silo: &Silo) -> Relief {
+    Relief { radius: silo.radius, bottom: silo.bottom(), top: silo.top, ..Relief::default() }
+}
+
+/// The silo's courses as steps of its wall.
+fn steps(silo: &Silo) -> Courses {
+    Courses(silo.courses.iter().map(|[end, radius]| [silo.top + end, radius - silo.radius]).collect())
+}
+
+fn bend(plan: &Bound<'_, PyAny>) -> PyResult<Option<Bend>> {
+    let bend = Bend { depth: number(plan, "bend")?, azimuth: number(plan, "bend_azimuth")? };
+    Ok((bend.depth != 0.0).then_some(bend))
 }
 
 fn corrugation(plan: &Bound<'_, PyAny>) -> PyResult<Option<Corrugation>> {
@@ -248,13 +277,41 @@ fn silo(object: &Bound<'_, PyAny>) -> PyResult<Silo> {
         cylinder_height: number(object, "cylinder_height")?,
         cone_height: number(object, "cone_height")?,
         top: number(object, "top")?,
+        floor: floor(object)?,
+        courses: courses(object)?,
         roof: object.getattr("roof")?.extract()?,
+        roof_height: number(object, "roof_height")?,
         outlet_radius: number(object, "outlet_radius")?,
         outlet_length: number(object, "outlet_length")?,
         outlet_offset: numbers(object, "outlet_offset")?,
     };
     silo.validate().map_err(convert::value_error)?;
     Ok(silo)
+}
+
+fn floor(object: &Bound<'_, PyAny>) -> PyResult<Bottom> {
+    let kind: String = object.getattr("bottom")?.extract()?;
+    Ok(match kind.as_str() {
+        "cone" => Bottom::Cone,
+        "oblique" => Bottom::Oblique,
+        "two-stage" => {
+            Bottom::TwoStage { waist: number(object, "waist_radius")?, depth: number(object, "waist_depth")? }
+        }
+        "pyramid" => Bottom::Pyramid { azimuth: number(object, "bottom_azimuth")? },
+        "flat" => Bottom::Flat,
+        other => {
+            let message = format!("unknown bottom '{other}'; known are cone, oblique, two-stage, pyramid, flat");
+            return Err(convert::value_error(message));
+        }
+    })
+}
+
+/// Rows (distance of the lower edge from the top edge, radius).
+fn courses(object: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 2]>> {
+    let rows = object.getattr("courses")?.extract();
+    rows.map_err(|_| {
+        convert::value_error("courses must be pairs: distance of the lower edge from the top edge, radius")
+    })
 }
 
 /// Reads a `siloscope.simulation.Feed`; its `resolved` numbers have no None left.
@@ -270,6 +327,12 @@ fn feed(object: &Bound<'_, PyAny>, silo: &Silo) -> PyResult<Option<Feed>> {
         base: match base.as_str() {
             "gaussian" => Base::Gaussian,
             "funnel" => Base::Conical(tangent, number(&plan, "tip")?),
+            "crater" => Base::Crater(
+                tangent,
+                number(&plan, "tip")?,
+                number(&plan, "crater_depth")?,
+                0.2 * number(&plan, "tip")?,
+            ),
             "mound" => Base::Conical(-tangent, number(&plan, "tip")?),
             _ => Base::Flat,
         },
@@ -326,6 +389,7 @@ fn sensor(object: &Bound<'_, PyAny>) -> PyResult<Sensor> {
         warp_length: number(object, "warp_length")?,
         warp_seed: seed(object, "warp_seed")?,
         bowl: number(object, "bowl")?,
+        multipath: number(object, "multipath")?,
         min_range: number(object, "min_range")?,
         max_range: number(object, "max_range")?,
         max_incidence: number(object, "max_incidence")?,
@@ -345,6 +409,7 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(sensor_laws, m)?)?;
     m.add_function(wrap_pyfunction!(feed_content, m)?)?;
     m.add_function(wrap_pyfunction!(feed_heights, m)?)?;
+    m.add_function(wrap_pyfunction!(silo_capacity, m)?)?;
     m.add_function(wrap_pyfunction!(nearest_distances, m)?)?;
     m.add_function(wrap_pyfunction!(check_silo, m)?)?;
     m.add_function(wrap_pyfunction!(check_sensor, m)?)

@@ -17,6 +17,9 @@ pub enum Base {
     /// A cone of the angle whose tangent is given, rounded over the second number's radius: positive tangents make
     /// a funnel, negative ones a mound.
     Conical(f64, f64),
+    /// A crater in a plain: a funnel as by the first two numbers, as deep as the third below the plain, its rim
+    /// rounded over the fourth.
+    Crater(f64, f64, f64, f64),
 }
 
 /// Smooth random bumps: a bicubic B-spline with random coefficients on a square lattice.
@@ -93,6 +96,13 @@ impl Base {
                 let rounded = (x * x + y * y + tip * tip).sqrt();
                 [tangent * (rounded - tip), tangent * x / rounded, tangent * y / rounded]
             }
+            Base::Crater(tangent, tip, depth, edge) => {
+                let rounded = (x * x + y * y + tip * tip).sqrt();
+                let cone = tangent * (rounded - tip) - depth;
+                let smooth = cone.hypot(edge);
+                let turn = 0.5 * (1.0 - cone / smooth) * tangent / rounded;
+                [0.5 * (cone - smooth), turn * x, turn * y]
+            }
         }
     }
 
@@ -101,7 +111,7 @@ impl Base {
         match *self {
             Base::Flat => 0.0,
             Base::Gaussian => 0.6434,
-            Base::Conical(tangent, _) => tangent.abs(),
+            Base::Conical(tangent, _) | Base::Crater(tangent, ..) => tangent.abs(),
         }
     }
 
@@ -111,6 +121,7 @@ impl Base {
             Base::Flat => 0.0,
             Base::Gaussian => 1.5 / radius,
             Base::Conical(tangent, tip) => tangent.abs() / tip,
+            Base::Crater(tangent, tip, _, edge) => tangent.abs() / tip + 0.5 * tangent * tangent / edge,
         }
     }
 }
@@ -216,7 +227,11 @@ impl Rathole {
 impl Shape {
     /// Checks slopes and holes.
     pub fn validate(&self) -> Result<()> {
-        if let Base::Conical(tangent, tip) = self.base {
+        if let Base::Crater(_, _, depth, edge) = self.base {
+            bounded("crater_depth", depth, 0.0, 1e3, "between 0 and 1000 m")?;
+            bounded("tip", edge, 1e-4 * self.radius, 1e3, "at least 0.0001 silo radii")?;
+        }
+        if let Base::Conical(tangent, tip) | Base::Crater(tangent, tip, ..) = self.base {
             bounded("angle", tangent.abs(), 0.0, 10.0, "between 0 and 1.47 rad")?;
             bounded("tip", tip, 1e-4 * self.radius, 1e3, "at least 0.0001 silo radii")?;
         }
@@ -312,7 +327,7 @@ fn highest_offset(silo: &Silo, shape: &Shape, top: f64) -> f64 {
     const SPOKES: usize = 144;
     let room = |r: f64, angle: f64| {
         let (sin, cos) = angle.sin_cos();
-        (silo.cone_height * r / silo.radius).max(top) - shape.jet(r * cos, r * sin)[0]
+        silo.floor_height(r, (cos, sin)).max(top) - shape.jet(r * cos, r * sin)[0]
     };
     let mut best = (room(0.0, 0.0), 0.0, 0.0);
     for ring in 1..=RINGS {

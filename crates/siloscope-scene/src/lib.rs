@@ -4,10 +4,15 @@
 //! sensor model ([`Sensor`]) spoils the exact depths. Rays hit surfaces to the accuracy of float64; noise is drawn by
 //! pixel number, so that it does not depend on the number of threads.
 
+pub mod bottom;
 pub mod clutter;
 pub mod feed;
+pub mod form;
 pub mod hit;
+pub mod jet;
 mod limits;
+mod multipath;
+mod quadrics;
 pub mod random;
 pub mod relief;
 pub mod render;
@@ -19,8 +24,10 @@ pub mod volume;
 pub mod wall;
 pub mod world;
 
+pub use bottom::Bottom;
 pub use clutter::{Bar, Bundle};
 pub use feed::{Feed, Lumps, Rathole};
+pub use form::{Bend, Courses};
 pub use hit::{Hit, Label};
 pub use relief::{Corrugation, Dent, Film, Relief, Seams};
 pub use render::{Exact, render};

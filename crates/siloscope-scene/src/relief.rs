@@ -2,12 +2,11 @@
 //!
 //! All heights are measured outwards from the perfect wall, over the arc `s = R·azimuth` and z.
 
+use crate::form::{Bend, Courses};
+use crate::jet::{Jet, Limits, add, bump, smooth, to_nearest};
 use crate::limits::bounded;
 use siloscope::Result;
 use std::f64::consts::TAU;
-
-/// Height over the perfect wall and its derivatives along the arc and z.
-pub type Jet = [f64; 3];
 
 /// A sinusoidal sheet, waves along z.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -85,70 +84,10 @@ pub struct Relief {
     pub dents: Vec<Dent>,
     /// Feed on the wall.
     pub films: Vec<Film>,
-}
-
-/// Bounds of a relief: how far in and out it reaches, its slope, and its second derivatives.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Limits {
-    /// Furthest inwards.
-    pub inwards: f64,
-    /// Furthest outwards.
-    pub outwards: f64,
-    /// Greatest slope.
-    pub slope: f64,
-    /// Greatest second derivative in any direction.
-    pub bend: f64,
-}
-
-impl Limits {
-    fn bump(height: f64, radius: f64) -> Self {
-        let h = height.abs();
-        // (1 - q²)³ has slopes up to 1.7174 and second derivatives up to 6
-        Self {
-            inwards: height.max(0.0),
-            outwards: (-height).max(0.0),
-            slope: 1.7174 * h / radius,
-            bend: 6.0 * h / (radius * radius),
-        }
-    }
-
-    fn widest(self, other: Self) -> Self {
-        Self {
-            inwards: self.inwards.max(other.inwards),
-            outwards: self.outwards.max(other.outwards),
-            slope: self.slope.max(other.slope),
-            bend: self.bend.max(other.bend),
-        }
-    }
-
-    fn plus(self, other: Self) -> Self {
-        Self {
-            inwards: self.inwards + other.inwards,
-            outwards: self.outwards + other.outwards,
-            slope: self.slope + other.slope,
-            bend: self.bend + other.bend,
-        }
-    }
-}
-
-fn add(a: Jet, b: Jet) -> Jet {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
-}
-
-/// `-height·(1 - q²)³` for q = |(ds, dz)|/radius < 1: a bump inwards.
-fn bump(height: f64, radius: f64, ds: f64, dz: f64) -> Jet {
-    let q2 = (ds * ds + dz * dz) / (radius * radius);
-    if q2 >= 1.0 {
-        return [0.0; 3];
-    }
-    let rest = 1.0 - q2;
-    let pull = 6.0 * height * rest * rest / (radius * radius);
-    [-height * rest * rest * rest, pull * ds, pull * dz]
-}
-
-/// Signed distance from `x` to the nearest multiple of `pitch`.
-fn to_nearest(x: f64, pitch: f64) -> f64 {
-    x - pitch * (x / pitch).round()
+    /// Rings of sheet of another radius; the cylinder only.
+    pub courses: Courses,
+    /// A generatrix that is not straight.
+    pub bend: Option<Bend>,
 }
 
 impl Corrugation {
@@ -220,11 +159,6 @@ impl Film {
     }
 }
 
-/// The quintic from 0 to 1 with flat ends, and its derivative.
-fn smooth(u: f64) -> (f64, f64) {
-    (u * u * u * (10.0 + u * (6.0 * u - 15.0)), 30.0 * u * u * (1.0 - u) * (1.0 - u))
-}
-
 impl Relief {
     /// Checks every length; reliefs deeper than a tenth of the radius are refused.
     pub fn validate(&self) -> Result<()> {
@@ -247,13 +181,17 @@ impl Relief {
             bounded("film_lobes", f64::from(film.lobes), 0.0, 64.0, "at most 64")?;
             bounded("film_azimuth", film.azimuth, -1e3, 1e3, "a finite angle")?;
         }
+        if let Some(bend) = &self.bend {
+            bend.validate(self.radius)?;
+        }
         let limits = self.limits(true);
         bounded("defects", limits.inwards.max(limits.outwards), 0.0, 0.2 * self.radius, "within 0.2 radii of the wall")
     }
 
     /// Whether the wall is even.
     pub fn is_flat(&self) -> bool {
-        self.corrugation.is_none() && self.seams.is_none() && self.dents.is_empty() && self.films.is_empty()
+        let even = self.corrugation.is_none() && self.seams.is_none() && self.bend.is_none();
+        even && self.dents.is_empty() && self.films.is_empty() && self.courses.0.is_empty()
     }
 
     /// Height and derivatives at a place of the cylinder, or of the cone.
@@ -267,8 +205,11 @@ impl Relief {
             let sheet = self.corrugation.map_or([0.0; 3], |sheet| sheet.jet(self.bottom - z));
             let seams = self.seams.map_or([0.0; 3], |seams| seams.jet(self.radius, azimuth, z - self.top));
             sum = add(sum, add(sheet, seams));
+            if !self.courses.0.is_empty() {
+                sum = add(sum, self.courses.jet(z));
+            }
         }
-        sum
+        self.bend.map_or(sum, |bend| add(sum, bend.jet(self.radius, azimuth, z, (self.top, self.bottom))))
     }
 
     /// Height of the feed on the wall alone (negative: it stands inwards).
@@ -283,8 +224,10 @@ impl Relief {
         if on_cylinder {
             sum = self.corrugation.iter().fold(sum, |sum, sheet| sum.plus(sheet.limits()));
             sum = self.seams.iter().fold(sum, |sum, seams| sum.plus(seams.limits()));
+            sum = sum.plus(self.courses.limits());
         }
-        sum
+        let height = self.bottom - self.top;
+        self.bend.iter().fold(sum, |sum, bend| sum.plus(bend.limits(self.radius, height)))
     }
 }
 
@@ -341,6 +284,8 @@ mod tests {
             }),
             dents: vec![Dent { azimuth: 3.1, z: 1.3, radius: 0.3, height: 0.03 }],
             films: vec![Film { from: 1.0, to: 1.6, thickness: 0.03, lobes: 2, azimuth: 0.4 }],
+            courses: Courses(vec![[0.9, 0.004], [2.1, -0.006]]),
+            bend: Some(Bend { depth: 0.008, azimuth: 0.7 }),
         }
     }
 
@@ -365,7 +310,8 @@ mod tests {
 
     #[test]
     fn the_corrugation_has_the_sheet_s_pitch_and_depth() {
-        let relief = Relief { seams: None, dents: vec![], films: vec![], ..rough() };
+        let relief =
+            Relief { seams: None, dents: vec![], films: vec![], courses: Courses::default(), bend: None, ..rough() };
         let heights: Vec<f64> = (0..7600).map(|i| relief.jet(0.3, 1.0 + 1e-5 * f64::from(i), true)[0]).collect();
         let (low, high) = heights.iter().fold((1.0f64, -1.0f64), |(low, high), &h| (low.min(h), high.max(h)));
         assert!((high - low - 0.013).abs() < 1e-8);

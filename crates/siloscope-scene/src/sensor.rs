@@ -2,6 +2,7 @@
 
 use crate::feed::spline;
 use crate::limits::bounded;
+use crate::multipath::Multipath;
 use crate::random::Stream;
 use crate::render::{Exact, check_threads};
 use siloscope::{Camera, Error, Result};
@@ -36,6 +37,9 @@ pub struct Sensor {
     pub warp_seed: u64,
     /// Depth added at the image's corner, growing with the squared distance from the principal point (multipath).
     pub bowl: f64,
+    /// Share of the light that surfaces throw back, for what a time-of-flight sensor sees of light that goes round; 0
+    /// for none of it.
+    pub multipath: f64,
     /// Nearest depth measured.
     pub min_range: f64,
     /// Farthest depth measured; infinite for no limit.
@@ -75,6 +79,7 @@ impl Default for Sensor {
             warp_length: 80.0,
             warp_seed: 0,
             bowl: 0.0,
+            multipath: 0.0,
             min_range: 0.0,
             max_range: f64::INFINITY,
             max_incidence: std::f64::consts::FRAC_PI_2,
@@ -121,6 +126,7 @@ impl Sensor {
         bounded("warp", self.warp, 0.0, 1.0, "between 0 and 1 m")?;
         bounded("warp_length", self.warp_length, 1.0, 1e4, "between 1 and 10000 pixels")?;
         bounded("bowl", self.bowl, -10.0, 10.0, "between -10 and 10 m")?;
+        bounded("multipath", self.multipath, 0.0, 1.0, "between 0 and 1")?;
         bounded("dropout_length", self.dropout_length, 0.0, 1e4, "between 0 and 10000 pixels")?;
         bounded("baseline", self.baseline, 0.0, 10.0, "between 0 and 10 m")?;
         bounded("min_range", self.min_range, 0.0, 1e3, "between 0 and 1000 m")?;
@@ -161,7 +167,8 @@ impl Sensor {
         }
         let mut out = Measured { depth: vec![0.0; pixels], false_returns: vec![false; pixels] };
         let band = camera.height.div_ceil(threads) * camera.width;
-        let pass = &Pass { sensor: self, exact, camera, seed, lattices: self.lattices(camera, seed) };
+        let multipath = Multipath::new(exact, camera, self.multipath);
+        let pass = &Pass { sensor: self, exact, camera, seed, lattices: self.lattices(camera, seed), multipath };
         std::thread::scope(|scope| {
             for (part, (depth, flags)) in out.depth.chunks_mut(band).zip(out.false_returns.chunks_mut(band)).enumerate()
             {
@@ -241,6 +248,7 @@ struct Pass<'a> {
     camera: &'a Camera,
     seed: u64,
     lattices: Lattices,
+    multipath: Multipath,
 }
 
 /// What the random streams are for.
@@ -297,7 +305,7 @@ impl Pass<'_> {
         d + sensor.bias_at(d) + self.lasting_error(pixel, d) + noise
     }
 
-    /// Warp and bowl: the same in every frame of a unit.
+    /// Warp and bowl, the same in every frame of a unit, and light that went round, the same in every frame of a scene.
     fn lasting_error(&self, pixel: usize, d: f64) -> f64 {
         let sensor = self.sensor;
         let mut error = 0.0;
@@ -311,6 +319,10 @@ impl Pass<'_> {
             let corner =
                 cx.max(self.camera.width as f64 - 1.0 - cx).hypot(cy.max(self.camera.height as f64 - 1.0 - cy));
             error += sensor.bowl * ((u - cx).powi(2) + (v - cy).powi(2)) / corner.powi(2).max(1e-12);
+        }
+        if sensor.multipath > 0.0 {
+            let (u, v) = self.place(pixel);
+            error += d * self.multipath.at(u, v);
         }
         error
     }

@@ -1,6 +1,7 @@
 //! How much feed there is, by quadrature.
 
 use crate::feed::Feed;
+use crate::silo::Silo;
 use std::f64::consts::TAU;
 
 /// The feed inside cylinder and cone (above the vertex's level surface of the cone; the outlet pipe is not counted).
@@ -77,7 +78,7 @@ fn along(feed: &Feed, angle: f64) -> Sums {
     let silo = &feed.silo;
     let (sin, cos) = angle.sin_cos();
     let surface = |r: f64| feed.height(r * cos, r * sin);
-    let thickness = |r: f64| surface(r) - silo.cone_height * r / silo.radius;
+    let thickness = |r: f64| surface(r) - silo.floor_height(r, (cos, sin));
     let at = |i: usize| silo.radius * i as f64 / PIECES as f64;
     let mut sums = NOTHING;
     for i in 0..PIECES {
@@ -90,7 +91,19 @@ fn along(feed: &Feed, angle: f64) -> Sums {
         };
         sums = sums.plus(piece(from, to, surface, thickness));
     }
+    sums.volume += in_courses(silo, surface);
     sums
+}
+
+/// Volume along one spoke between the silo's radius and that of its courses; negative where they are narrower.
+fn in_courses(silo: &Silo, surface: impl Fn(f64) -> f64) -> f64 {
+    let mut upper = 0.0;
+    let ring = |&[lower, radius]: &[f64; 2]| {
+        let (high, low) = (silo.height() - upper, silo.height() - lower);
+        upper = lower;
+        piece(silo.radius, radius, |_| 0.0, |r| surface(r).min(high).max(low) - low).volume
+    };
+    silo.courses.iter().map(ring).sum()
 }
 
 /// The place between a covered and an uncovered radius where the feed ends, by bisection.

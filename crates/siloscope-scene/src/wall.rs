@@ -1,8 +1,10 @@
 //! Walls that are not perfect: uneven and oval, found along the ray by safe steps.
 
+use crate::bottom::{Bottom, level, sheared_point, sheared_ray, unsheared};
 use crate::hit::{Hit, Label};
+use crate::jet::Limits;
 use crate::limits::bounded;
-use crate::relief::{Limits, Relief};
+use crate::relief::Relief;
 use crate::root::{Probe, first_crossing};
 use crate::silo::Silo;
 use siloscope::{Result, Vec3};
@@ -77,10 +79,24 @@ impl Wall {
             return self.cast_zone(origin, ray, Zone::Cylinder, 0.0, end);
         }
         let change = at_height(bottom).max(0.0);
+        let at = self.silo.place();
+        let vertex = || level(apex, origin, ray);
+        let cone = |o: &Vec3, d: &Vec3| self.cast_zone(o, d, Zone::Cone, change, at_height(apex));
         let cylinder = self.cast_zone(origin, ray, Zone::Cylinder, 0.0, change);
-        let cone = || self.cast_zone(origin, ray, Zone::Cone, change, at_height(apex));
-        let vertex = || Hit { t: at_height(apex), normal: -Vec3::z(), label: Label::Cone };
-        cylinder.or_else(cone).or_else(|| Some(vertex()))
+        cylinder.or_else(|| match self.silo.floor {
+            Bottom::Cone => cone(origin, ray).or_else(|| Some(vertex())),
+            Bottom::Oblique => {
+                let hit = cone(&sheared_point(&at, origin), &sheared_ray(&at, ray));
+                Some(hit.map_or_else(vertex, |hit| unsheared(&at, hit)))
+            }
+            Bottom::Pyramid { .. } => {
+                let below = self.cast_zone(origin, ray, Zone::Cylinder, change, at_height(apex));
+                let side = self.silo.floor.cast(&at, origin, ray).filter(|hit| hit.label == Label::Cone);
+                below.into_iter().chain(side).min_by(|a, b| a.t.total_cmp(&b.t)).or_else(|| Some(vertex()))
+            }
+            // A wall that bulges out over the rim leaves a ledge there.
+            floor => floor.cast(&at, origin, ray).or_else(|| Some(level(bottom, origin, ray))),
+        })
     }
 
     fn cast_zone(&self, origin: &Vec3, ray: &Vec3, zone: Zone, start: f64, end: f64) -> Option<Hit> {
@@ -162,7 +178,7 @@ impl Wall {
 
     /// Unit normal towards the air.
     fn normal(&self, p: &Vec3, zone: Zone) -> Vec3 {
-        let out = crate::silo::radial(p);
+        let out = crate::quadrics::radial(p);
         let around = Vec3::new(-out.y, out.x, 0.0);
         let reach = self.reach(p, zone);
         let r = p.xy().norm().max(1e-300);

@@ -4,19 +4,34 @@ use proptest::prelude::*;
 use siloscope::Vec3;
 use siloscope_scene::feed::{Base, Lumps, Shape};
 use siloscope_scene::{
-    Corrugation, Dent, Feed, Film, Label, Rathole, Relief, Seams, Silo, SiloWorld, Wall, World, volume,
+    Bend, Bottom, Corrugation, Courses, Dent, Feed, Film, Label, Rathole, Relief, Seams, Silo, SiloWorld, Wall, World,
+    volume,
 };
 
 fn silos() -> impl Strategy<Value = Silo> {
-    (0.5..3.0f64, 0.0..5.0f64, 0.3..3.0f64, -1.0..0.0f64).prop_map(|(radius, above, cone_height, top)| Silo {
-        radius,
-        cylinder_height: above - top,
-        cone_height,
-        top,
-        roof: false,
-        outlet_radius: 0.0,
-        outlet_length: 0.0,
-        outlet_offset: [0.0; 2],
+    let lengths = (0.5..3.0f64, 0.0..5.0f64, 0.3..3.0f64, -1.0..0.0f64);
+    (lengths, 0..5u32, 0.2..0.8f64, -3.1..3.1f64, 0.9..1.05f64).prop_map(|(lengths, kind, share, azimuth, ring)| {
+        let (radius, above, cone_height, top) = lengths;
+        let floor = match kind {
+            0 => Bottom::Cone,
+            1 => Bottom::Oblique,
+            2 => Bottom::TwoStage { waist: share * radius, depth: (1.0 - share) * cone_height },
+            3 => Bottom::Pyramid { azimuth },
+            _ => Bottom::Flat,
+        };
+        let aside = if floor == Bottom::Oblique { share * radius } else { 0.0 };
+        let cylinder_height = above - top;
+        let stepped = cylinder_height > 0.5 && share > 0.5;
+        Silo {
+            radius,
+            cylinder_height,
+            cone_height: if floor == Bottom::Flat { 0.0 } else { cone_height },
+            top,
+            floor,
+            courses: if stepped { vec![[share * cylinder_height, ring * radius]] } else { vec![] },
+            outlet_offset: [aside * azimuth.cos(), aside * azimuth.sin()],
+            ..Silo::default()
+        }
     })
 }
 
@@ -24,6 +39,8 @@ fn bases() -> impl Strategy<Value = Base> {
     prop_oneof![
         Just(Base::Flat),
         Just(Base::Gaussian),
+        (0.2..1.5f64, 0.02..0.5f64, 0.0..1.0f64, 0.01..0.1f64)
+            .prop_map(|(a, tip, depth, edge)| Base::Crater(a, tip, depth, edge)),
         (-1.5..1.5f64, 0.02..0.5f64).prop_map(|(tangent, tip)| Base::Conical(tangent, tip)),
     ]
 }
@@ -61,15 +78,43 @@ fn directions() -> impl Strategy<Value = Vec3> {
 
 /// A place in the silo at the camera's height.
 fn origin_in(silo: &Silo, share: f64, azimuth: f64) -> Vec3 {
-    let widest = silo.radius.min(silo.slope() * silo.apex());
+    let widest = silo.narrowest();
     Vec3::new(share * widest * azimuth.cos(), share * widest * azimuth.sin(), 0.0)
+}
+
+/// How far a point lies over the bottom, straight up.
+fn over_bottom(silo: &Silo, p: &Vec3) -> f64 {
+    let r = p.xy().norm().max(1e-300);
+    silo.apex() - silo.floor_height(r, (p.x / r, p.y / r)) - p.z
 }
 
 /// How far a point is inside the silo's air; negative behind a surface.
 fn clearance(silo: &Silo, feed: Option<&Feed>, p: &Vec3) -> f64 {
-    let wall = silo.radius.min(silo.slope() * (silo.apex() - p.z)) - p.xy().norm();
+    let wall = silo.radius - p.xy().norm();
     let above = feed.map_or(f64::INFINITY, |feed| feed.depth_below(p));
-    wall.min(above)
+    wall.min(over_bottom(silo, p)).min(above)
+}
+
+/// How far a point is inside an uneven wall or, where no unevenness goes on below the rim, over the bottom.
+fn gap(wall: &Wall, p: &Vec3) -> f64 {
+    let silo = &wall.silo;
+    let space = |p: &Vec3, perfect: f64, on_cylinder: bool| {
+        let angle = p.y.atan2(p.x);
+        let oval = 1.0 + wall.ovality * (2.0 * (angle - wall.ovality_azimuth)).cos();
+        let relief = wall.relief.jet(angle, p.z, on_cylinder)[0];
+        perfect * oval + perfect / silo.radius * relief - p.xy().norm()
+    };
+    let share = (p.z - silo.bottom()) / silo.cone_height;
+    let [x, y] = if silo.floor == Bottom::Oblique { silo.outlet_offset } else { [0.0; 2] };
+    match silo.floor {
+        _ if p.z < silo.bottom() => space(p, silo.radius, true),
+        Bottom::Cone | Bottom::Oblique => {
+            space(&(p - Vec3::new(share * x, share * y, 0.0)), silo.slope() * (silo.apex() - p.z), false)
+        }
+        _ if p.xy().norm() > silo.radius => 0.0, // a ledge
+        Bottom::Pyramid { .. } => over_bottom(silo, p).min(space(p, silo.radius, true)),
+        _ => over_bottom(silo, p),
+    }
 }
 
 fn rough(silo: &Silo) -> Relief {
@@ -90,6 +135,8 @@ fn rough(silo: &Silo) -> Relief {
         }),
         dents: vec![Dent { azimuth: 1.0, z: silo.bottom(), radius: 0.4 * r, height: 0.03 * r }],
         films: vec![Film { from: 0.3, to: silo.apex() - 0.1, thickness: 0.02 * r, lobes: 3, azimuth: 0.2 }],
+        courses: Courses(silo.courses.iter().map(|[end, radius]| [silo.top + end, radius - r]).collect()),
+        bend: Some(Bend { depth: 0.01 * r, azimuth: 0.9 }),
     }
 }
 
@@ -121,19 +168,13 @@ proptest! {
         let origin = origin_in(&silo, share, azimuth);
         let world = SiloWorld { silo: silo.clone(), wall: Some(wall.clone()), feed: None, clutter: vec![] };
         prop_assume!(world.check_camera(&origin).is_ok());
-        let radius = |p: &Vec3| {
-            let perfect = silo.radius.min(silo.slope() * (silo.apex() - p.z));
-            let angle = p.y.atan2(p.x);
-            let oval = 1.0 + ovality * (2.0 * (angle - 0.4)).cos();
-            perfect * oval + perfect / silo.radius * wall.relief.jet(angle, p.z, p.z < silo.bottom())[0]
-        };
         let Some(hit) = world.cast(&origin, &ray) else {
             prop_assert!(ray.z < 0.0);
             return Ok(());
         };
-        let gap = |t: f64| { let p = origin + ray * t; radius(&p) - p.xy().norm() };
-        prop_assert!(gap(hit.t).abs() < 1e-9);
-        prop_assert!((1..2000).all(|i| gap(hit.t * f64::from(i) / 2000.0) > -1e-9));
+        let at = |t: f64| gap(&wall, &(origin + ray * t));
+        prop_assert!(at(hit.t).abs() < 1e-9, "{:?} is {} off", hit, at(hit.t));
+        prop_assert!((1..2000).all(|i| at(hit.t * f64::from(i) / 2000.0) > -1e-9));
     }
 }
 
@@ -155,20 +196,11 @@ proptest! {
 
 #[test]
 fn the_vertex_itself_is_the_cone() {
-    let silo = Silo {
-        radius: 1.0,
-        cylinder_height: 2.0,
-        cone_height: 1.0,
-        top: 0.0,
-        roof: false,
-        outlet_radius: 0.0,
-        outlet_length: 0.0,
-        outlet_offset: [0.0; 2],
-    };
+    let silo = Silo { radius: 1.0, cylinder_height: 2.0, cone_height: 1.0, ..Silo::default() };
     let world = SiloWorld { silo: silo.clone(), wall: None, feed: None, clutter: vec![] };
     let hit = world.cast(&Vec3::zeros(), &Vec3::z()).map(|hit| (hit.t, hit.label));
     assert_eq!(hit, Some((3.0, Label::Cone)));
-    let relief = Relief { dents: vec![], films: vec![], seams: None, ..rough(&silo) };
+    let relief = Relief { dents: vec![], films: vec![], seams: None, bend: None, ..rough(&silo) };
     let wall = Wall::new(&silo, relief, 0.0, 0.0).ok();
     let hit = SiloWorld { wall, ..world }.cast(&Vec3::zeros(), &Vec3::z()).map(|hit| (hit.t, hit.label));
     assert!(matches!(hit, Some((t, Label::Cone)) if (t - 3.0).abs() < 1e-9), "{hit:?}");

@@ -1,19 +1,22 @@
 """Synthetic silos with exact truth (section 2.4): the walls, the feed, the sensor, and the frames it takes."""
 
 from siloscope.simulation.content import Content, content_of
-from siloscope.simulation.defects import DEFECTS, Defects, defects
+from siloscope.simulation.defects import ALL, DEFECTS, Defects, defects
 from siloscope.simulation.feed import BASES, EXTRAS, Feed
+from siloscope.simulation.intrinsics import PRIORS, true_camera
 from siloscope.simulation.scene import ASTRA, WORLDS, Scene, SimulatedFrame, discharge
 from siloscope.simulation.sensor_model import ASTRA_S, PERFECT, SensorModel, sensor_model
 from siloscope.simulation.silo import Silo
 
 __all__ = [
+    "ALL",
     "ASTRA",
     "ASTRA_S",
     "BASES",
     "DEFECTS",
     "EXTRAS",
     "PERFECT",
+    "PRIORS",
     "WORLDS",
     "Content",
     "Defects",
@@ -26,4 +29,5 @@ __all__ = [
     "defects",
     "discharge",
     "sensor_model",
+    "true_camera",
 ]

@@ -30,6 +30,11 @@ class Defects:
     """Share of the radius by which the wall is out of round: ``r = R (1 + ovality cos 2(azimuth - axis))``."""
     ovality_azimuth: float = 0.0
     """Azimuth of the long diameter."""
+    bend: float = 0.0
+    """Generatrix that is not straight: displacement of both ends of the cylinder, half of it the other way in the
+    middle, so that the axis is the best straight line. The cone hangs at the lower end; its vertex is on the axis."""
+    bend_azimuth: float = 0.0
+    """Direction of the ends' displacement."""
     seam_spacing: float = 0.0
     """Distance between overlaps around the silo, 0 for none."""
     upright_seams: int = 0
@@ -87,6 +92,8 @@ class Defects:
             corrugation_pitch=self.corrugation_pitch,
             ovality=self.ovality,
             ovality_azimuth=self.ovality_azimuth,
+            bend=self.bend,
+            bend_azimuth=self.bend_azimuth,
             seam_spacing=self.seam_spacing,
             upright_seams=self.upright_seams,
             seam_height=self.seam_height,
@@ -124,22 +131,28 @@ class Defects:
 DEFECTS: dict[str, dict[str, Any]] = {
     "corrugated": {"corrugation_depth": 0.013},
     "oval": {"ovality": 0.01, "ovality_azimuth": 0.5},
+    "bent": {"bend": 0.005, "bend_azimuth": 1.2},
     "seams": {"seam_spacing": 1.0, "upright_seams": 5, "bolts": 40},
     "dents": {"dents": 12},
     "film": {"film_bands": ((0.6, 1.2, 0.03), (1.8, 2.3, 0.05)), "film_lobes": 2},
+    "cake": {"film_bands": ((0.9, 2.6, 0.04),)},
+    "build-up": {"film_bands": ((1.0, 2.4, 0.04),), "film_lobes": 1},
     "ladder": {"ladder": True},
     "cables": {"cables": 4},
     "auger": {"auger": True},
 }
 """Usual sizes of each defect by name."""
 
+ALL = ("corrugated", "oval", "seams", "dents", "film", "ladder", "cables", "auger")
+"""Those that "all" means."""
+
 
 def defects(names: str, seed: int = 0) -> Defects:
-    """Defects of usual size: names of `DEFECTS` joined by "+" or ",", or "all" of them.
+    """Defects of usual size: names of `DEFECTS` joined by "+" or ",", or "all" of `ALL`.
 
     Raises `UsageError` for an unknown name.
     """
-    wanted = list(DEFECTS) if names == "all" else [name.strip() for name in names.replace("+", ",").split(",")]
+    wanted = list(ALL) if names == "all" else [name.strip() for name in names.replace("+", ",").split(",")]
     unknown = [name for name in wanted if name not in DEFECTS]
     if unknown:
         raise UsageError(f"unknown defect '{unknown[0]}'; known are {', '.join(DEFECTS)} and all")
@@ -155,6 +168,8 @@ class ResolvedDefects:
     corrugation_pitch: float
     ovality: float
     ovality_azimuth: float
+    bend: float
+    bend_azimuth: float
     seam_spacing: float
     upright_seams: int
     seam_height: float

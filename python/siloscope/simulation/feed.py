@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from siloscope.errors import UsageError
 
-BASES = ("gaussian", "funnel", "mound", "flat")
+BASES = ("gaussian", "funnel", "mound", "crater", "flat")
 """Feed shapes that stand alone."""
 
 EXTRAS = ("tilted", "lumpy", "rathole")
@@ -21,13 +21,16 @@ class Feed:
     ----------
     shape : str
         A base (`BASES`) and any `EXTRAS`, joined by "+": "gaussian" is the paper's (section 2.4.1), "funnel" an
-        inverted cone, "mound" an upright one; "tilted", "lumpy" and "rathole" alone stand on a flat base.
+        inverted cone (over a flat floor a ring of dead feed), "mound" an upright one, "crater" a plain with a
+        funnel drawn down in it; "tilted", "lumpy" and "rathole" alone stand on a flat base.
     level : float
         Height of the highest feed point over the vertex as a share of cylinder and cone height.
     angle, tip : float
         Angle of repose of funnel and mound (0.45) and the radius over which their tip is rounded (0.1 R).
     centre : pair of float
-        Where funnel, mound or Gaussian have their axis.
+        Where funnel, mound, crater or Gaussian have their axis.
+    crater_depth : float
+        Depth of a crater below its plain (0.6 R).
     tilt, tilt_azimuth : float
         Slope of the whole surface (0.15 where "tilted") and the direction in which it rises.
     lump_height, lump_size : float
@@ -43,6 +46,7 @@ class Feed:
     angle: float | None = None
     tip: float | None = None
     centre: tuple[float, float] = (0.0, 0.0)
+    crater_depth: float | None = None
     tilt: float | None = None
     tilt_azimuth: float = 0.0
     lump_height: float | None = None
@@ -83,6 +87,7 @@ class Feed:
             angle=given(self.angle, 0.45),
             tip=given(self.tip, 0.1 * radius),
             centre=self.centre,
+            crater_depth=given(self.crater_depth, 0.6 * radius),
             tilt=chosen(self.tilt, "tilted", 0.15),
             tilt_azimuth=self.tilt_azimuth,
             lump_height=chosen(self.lump_height, "lumpy", 0.08 * radius),
@@ -103,6 +108,7 @@ class ResolvedFeed:
     angle: float
     tip: float
     centre: tuple[float, float]
+    crater_depth: float
     tilt: float
     tilt_azimuth: float
     lump_height: float

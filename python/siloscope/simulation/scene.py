@@ -56,6 +56,9 @@ class Scene:
     across the axis at the cone's vertex, "corner" a floor and two walls, "shaft" a square shaft on a pyramid, "sphere"
     the inside of one, "noise" has a random depth in every pixel, "nothing" none."""
 
+    told: Camera | None = None
+    """What is told of the camera; None where that is the truth, `camera`."""
+
     def __post_init__(self) -> None:
         for name, kind in _PARTS.items():
             if not isinstance(getattr(self, name), kind):
@@ -106,6 +109,7 @@ class Scene:
             "defects": None if self.defects is None else asdict(self.defects),
             "seed": self.seed,
             "world": self.world,
+            **({"told": self.told.to_dict()} if self.told else {}),
         }
 
 
@@ -116,6 +120,7 @@ _PARTS = {
     "feed": Feed | None,
     "sensor": SensorModel,
     "defects": Defects | None,
+    "told": Camera | None,
 }
 
 
@@ -204,8 +209,8 @@ class SimulatedFrame:
         return np.where(counts < 65535, counts, 0).astype(np.uint16)
 
     def frame(self) -> Frame:
-        """The measured depth as a `Frame` in metres."""
-        return Frame(depth=self.measured, camera=self.camera, source="simulated frame")
+        """The measured depth as a `Frame` in metres, with the camera that is told."""
+        return Frame(depth=self.measured, camera=self.scene.told or self.camera, source="simulated frame")
 
     def truth(self) -> dict[str, Any]:
         """Plain data: pose, geometry, content and ratios."""

@@ -44,6 +44,9 @@ class SensorModel:
     """The unit whose warp it is."""
     bowl: float = 0.0
     """Depth added at the image's corner, growing with the squared distance from its centre (multipath)."""
+    multipath: float = 0.0
+    """Share of the light that surfaces throw back, for a time-of-flight sensor that also sees light which went round
+    once, by the scene's geometry; 0 for none of it. 0.1 lengthens a silo's depths by about 1 %."""
     min_range: float = 0.0
     """Nearest depth measured."""
     max_range: float = math.inf

@@ -13,15 +13,19 @@ from siloscope.simulation.checked import checked
 from siloscope.simulation.feed import Feed
 from siloscope.types.vessel import SiloGeometry
 
+BOTTOMS = ("cone", "oblique", "two-stage", "pyramid", "flat")
+"""What can close a silo below."""
+
 
 @dataclass(frozen=True)
 class Silo:
-    """A cylinder on a cone, in metres. The silo frame's z points down and is 0 at the camera's height."""
+    """A cylinder on a bottom, in metres. The silo frame's z points down and is 0 at the camera's height."""
 
     radius: float
+    """Radius of the cylinder, of its lowest course where it has several."""
     cylinder_height: float
     cone_height: float
-    """Height from the cylinder's bottom to the cone's vertex, which an outlet may have cut away."""
+    """Height from the cylinder's bottom to the vertex, which an outlet may have cut away; 0 for a flat floor."""
     outlet_radius: float = 0.0
     """Radius of the outlet pipe; 0 for a cone that ends in its vertex."""
     top: float = 0.0
@@ -29,9 +33,22 @@ class Silo:
     outlet_length: float = 0.3
     """How far the outlet pipe reaches below the vertex, to its closed end."""
     outlet_offset: tuple[float, float] = (0.0, 0.0)
-    """Offset of the outlet pipe from the axis."""
+    """Offset of the outlet pipe from the axis, and of an oblique cone's vertex."""
     roof: bool = False
-    """Whether a flat roof covers the upper edge."""
+    """Whether a roof covers the upper edge."""
+    roof_height: float = 0.0
+    """Height of the roof's tip over the edge; 0 for a flat roof."""
+    bottom: str = "cone"
+    """One of `BOTTOMS`: a right cone; an oblique one, whose vertex is at `outlet_offset`; a cone to a waist and another
+    from there; a pyramid of four sides that touch the cylinder at its lower edge; a flat floor."""
+    waist_radius: float = 0.0
+    """Radius between both stages of "two-stage"."""
+    waist_depth: float = 0.0
+    """How far the waist lies below the cylinder."""
+    bottom_azimuth: float = 0.0
+    """Direction in which one side of a pyramid falls, rad."""
+    courses: tuple[tuple[float, float], ...] = ()
+    """Rings of sheet above the lowest one: distance of the lower edge from the top edge, and radius; from above."""
 
     def __post_init__(self) -> None:
         checked(_core.check_silo, self)
@@ -43,23 +60,25 @@ class Silo:
 
     @property
     def capacity(self) -> float:
-        """Volume of cylinder and cone down to the vertex, m³, without the outlet pipe."""
-        return math.pi * self.radius**2 * (self.cylinder_height + self.cone_height / 3.0)
+        """Volume of cylinder and bottom down to the vertex, m³, without the outlet pipe."""
+        if self.bottom == "cone" and not self.courses:
+            return math.pi * self.radius**2 * (self.cylinder_height + self.cone_height / 3.0)
+        return checked(_core.silo_capacity, self)
 
     @property
     def cylinder_bottom(self) -> float:
-        """z where the cylinder meets the cone."""
+        """z where the cylinder meets the bottom."""
         return self.top + self.cylinder_height
 
     @property
     def apex(self) -> float:
-        """z of the cone's vertex."""
+        """z of the bottom's vertex, or of a flat floor."""
         return self.cylinder_bottom + self.cone_height
 
     @property
     def geometry(self) -> SiloGeometry:
-        """The silo as estimates describe it."""
-        return SiloGeometry(self.radius, self.cylinder_bottom, self.apex)
+        """The silo as estimates describe it; a flat floor has no apex."""
+        return SiloGeometry(self.radius, self.cylinder_bottom, None if self.bottom == "flat" else self.apex)
 
     def feed_heights(self, feed: Feed | None, places: ArrayLike) -> NDArray[np.float64]:
         """Height of the feed surface over the vertex at places (..., 2) of the silo frame's x and y.
