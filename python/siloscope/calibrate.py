@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -15,7 +14,7 @@ from numpy.typing import ArrayLike
 from siloscope.errors import UsageError
 from siloscope.fusion.history import History
 from siloscope.fusion.report import calibration_of
-from siloscope.fusion.schedule import FrameLocator, Inline, located
+from siloscope.fusion.schedule import FrameLocator, Inline, located, pool_of
 from siloscope.fusion.settings import brought_settings, common_camera, settings_of
 from siloscope.io import FrameSource
 from siloscope.io.given import given_frames
@@ -89,8 +88,8 @@ def calibrate(
     source = given_frames(frames, camera, depth_unit)
     one = FrameLocator(locate, camera, depth_unit, settings)
     ahead = 0 if jobs == 1 else 2 * jobs
-    with Inline() if jobs == 1 else ThreadPoolExecutor(jobs) as pool:
-        read = source.ahead(pool, ahead) if isinstance(source, FrameSource) else source
+    with pool_of(jobs) as pool:
+        read = source.ahead(pool, ahead) if isinstance(source, FrameSource) and not isinstance(pool, Inline) else source
         answers = list(located(progress(read) if progress else read, one, pool, ahead))
     lost = source.problems if isinstance(source, FrameSource) else []
     read_until = time.perf_counter()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Executor, Future
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from siloscope.errors import InputError
 from siloscope.estimation.decimation import decimated
@@ -15,6 +15,11 @@ from siloscope.fusion.settings import Settings
 from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
+
+Result = TypeVar("Result")
 
 FULL_SEARCH_PERIOD = 16
 """Frames from one that is searched for the wall to the next; the others look first where such a frame has shown it."""
@@ -66,12 +71,12 @@ class FrameLocator:
         return estimate if estimate is not None and estimate.ok else None
 
 
-def located(frames: Iterable[Any], one: FrameLocator, pool: Executor, ahead: int) -> Iterator[LocatedFrame]:
+def located(frames: Iterable[Any], one: FrameLocator, pool: Executor | Inline, ahead: int) -> Iterator[LocatedFrame]:
     """The frames located in order; the next ones are read and located in `pool`, so many `ahead`.
 
     Which frame starts from which answer is settled by their order alone, so that the pool doesn't change any answer.
     """
-    waiting: deque[Future[Located]] = deque()
+    waiting: deque[Future[Located] | Done[Located]] = deque()
     starts = WarmStartSchedule()
     for number, frame in enumerate(frames):
         waiting.append(pool.submit(one, number, frame, starts.of(number)))
@@ -89,7 +94,7 @@ class WarmStartSchedule:
     """
 
     def __init__(self) -> None:
-        self.searched: deque[Future[Located]] = deque()
+        self.searched: deque[Future[Located] | Done[Located]] = deque()
         self.start: Estimate | None = None
 
     def of(self, number: int) -> Estimate | None:
@@ -102,17 +107,38 @@ class WarmStartSchedule:
             self.start = found if found is not None and found.ok else self.start
         return self.start
 
-    def add(self, number: int, answer: Future[Located]) -> None:
+    def add(self, number: int, answer: Future[Located] | Done[Located]) -> None:
         """Takes the answer of a frame that will be one to start from."""
         if number % FULL_SEARCH_PERIOD == 0:
             self.searched.append(answer)
 
 
-class Inline(Executor):
-    """Does the work at once, in this thread."""
+@contextmanager
+def pool_of(jobs: int) -> Iterator[Executor | Inline]:
+    """Threads for so many jobs at a time; for one, this thread."""
+    if jobs == 1:
+        yield Inline()
+        return
+    from concurrent.futures import ThreadPoolExecutor
 
-    def submit(self, work: Callable[..., Any], /, *given: Any, **named: Any) -> Future[Any]:
+    with ThreadPoolExecutor(jobs) as pool:
+        yield pool
+
+
+class Inline:
+    """Does the work at once, in this thread; stands for a pool."""
+
+    def submit(self, work: Callable[..., Result], /, *given: Any) -> Done[Result]:
         """The work, done."""
-        done: Future[Any] = Future()
-        done.set_result(work(*given, **named))
-        return done
+        return Done(work(*given))
+
+
+@dataclass(frozen=True)
+class Done(Generic[Result]):
+    """What has been worked out, as a future gives it."""
+
+    value: Result
+
+    def result(self) -> Result:
+        """The value."""
+        return self.value

@@ -13,7 +13,7 @@ from os import PathLike
 from pathlib import Path
 
 from siloscope.errors import InputError, UsageError
-from siloscope.io.camera_files.sizes import Known
+from siloscope.io.camera_sizes import Known
 from siloscope.io.chain import Chain, Unreadable
 from siloscope.io.source import HEAD_BYTES, Format, FrameSource, Item, Options
 from siloscope.types.camera import Camera

@@ -5,23 +5,25 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Callable, Iterator
-from concurrent.futures import Executor, Future
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.errors import InputError
-from siloscope.io.camera_files.sizes import choose
+from siloscope.io.camera_sizes import choose
 from siloscope.io.terms import Options as Options
 from siloscope.io.terms import UnknownUnit, finish
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
 from siloscope.wording import printable
+
+if TYPE_CHECKING:
+    from concurrent.futures import Executor, Future
 
 MAX_SIDE = 20_000
 """Largest width or height of an image, in pixels (as in `Camera`)."""

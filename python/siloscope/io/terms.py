@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.errors import InputError
-from siloscope.io.camera_files.sizes import Known, choose
+from siloscope.io.camera_sizes import Known, choose
 from siloscope.types.frame import Frame
 
 FARTHEST_M = 100.0

@@ -37,8 +37,9 @@ def from_toml(data: bytes, source: str, what: str, remedy: str) -> dict[str, Any
         raise InputError(f"{source}: no TOML {what} ({error}); {remedy}") from None
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Writes a file; one that is already there stays whole until the new one is complete."""
+def write_json(path: Path, document: Any) -> None:
+    """Writes a document without blanks; a file that is already there stays whole until the new one is complete."""
+    text = json.dumps(document, allow_nan=False, separators=(",", ":")) + "\n"
     beside = path.with_name(f".{path.name}.part")
     try:
         beside.write_text(text, encoding="utf-8")

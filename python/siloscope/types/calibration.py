@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from dataclasses import dataclass, field, fields
 from os import PathLike
@@ -15,7 +14,6 @@ from numpy.typing import NDArray
 from siloscope.parameters import PARAMETERS
 from siloscope.reasons import FRAME_STATUSES
 from siloscope.schema import CALIBRATION
-from siloscope.schema.files import write_whole
 from siloscope.types.frame_factor import FrameFactor, SummedFactor
 from siloscope.types.move import Move
 from siloscope.types.pose import SiloPose
@@ -206,7 +204,9 @@ class Calibration:
 
     def save(self, path: str | PathLike[str]) -> None:
         """Writes the JSON document; raises `OSError` where that is not possible."""
-        write_whole(Path(path), json.dumps(self.to_dict(), allow_nan=False, separators=(",", ":")) + "\n")
+        from siloscope.schema.files import write_json
+
+        write_json(Path(path), self.to_dict())
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Calibration:

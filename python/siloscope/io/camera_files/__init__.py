@@ -17,9 +17,9 @@ from siloscope.io.camera_files.documents import from_document, joined
 from siloscope.io.camera_files.enumeration import from_enumeration
 from siloscope.io.camera_files.fields import CameraFile, camera, from_fields, from_matrix
 from siloscope.io.camera_files.opencv import fields_of, is_file_storage
-from siloscope.io.camera_files.sizes import Intrinsics, choose, size_of
 from siloscope.io.camera_files.tables import calibrations, stream_cameras
 from siloscope.io.camera_files.writing import dump
+from siloscope.io.camera_sizes import Intrinsics, choose, size_of
 from siloscope.types.camera import Camera
 
 __all__ = [

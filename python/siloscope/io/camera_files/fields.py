@@ -11,8 +11,8 @@ import numpy as np
 
 from siloscope.errors import InputError
 from siloscope.io.camera_files.distortion import distortion_model, is_fisheye
-from siloscope.io.camera_files.sizes import Intrinsics, Known
 from siloscope.io.camera_files.tables import bop_unit
+from siloscope.io.camera_sizes import Intrinsics, Known
 from siloscope.types.camera import Camera
 
 _FIELD_NAMES = {
