@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+import foxglove_files as foxglove
 from bags import START_NS, Maker, Message, orbbec, png16, quantised
 from siloscope import _core
 
@@ -66,6 +67,13 @@ def compressed_depth() -> bytes:
     """A ROS 1 bag with quantised floating-point depth."""
     maker = Maker(1)
     image = maker.compressed("32FC1; compressedDepth png", quantised(METRES, 10_100.0, -1009.0))
+    return _in_folder(lambda path: maker.write(path, [("/depth/image/compressedDepth", START_NS, image)]))
+
+
+def compressed_rvl() -> bytes:
+    """A ROS 1 bag with depth as RVL."""
+    maker = Maker(1)
+    image = maker.compressed("16UC1; compressedDepth rvl", foxglove.transported(RAW[0]))
     return _in_folder(lambda path: maker.write(path, [("/depth/image/compressedDepth", START_NS, image)]))
 
 
@@ -189,6 +197,29 @@ def _section(columns: list[bytes], at: int) -> bytes:
     return struct.pack("<B7xQQQ", 1, 32 + len(packet), _physical(at + 32), 0) + packet
 
 
+# --- Foxglove and OAK.
+
+
+def _foxglove(encoding: str) -> bytes:
+    """An image with its calibration, a compressed one and a cloud."""
+    points = np.random.default_rng(4).normal(size=(60, 3)).astype(np.float32)
+    return foxglove.mcap(
+        [
+            ("/cam/calibration", "foxglove.CameraCalibration", foxglove.calibration((16, 12), K)),
+            ("/cam/image", "foxglove.RawImage", foxglove.raw_image(RAW[0])),
+            ("/cam/compressed", "foxglove.CompressedImage", foxglove.compressed_image(png16(RAW[0]), "png")),
+            ("/points", "foxglove.PointCloud", foxglove.point_cloud(points)),
+        ],
+        encoding,
+    )
+
+
+def _oak() -> bytes:
+    """An OAK's depth."""
+    frame = foxglove.oak_frame(RAW[0], np.array(K).reshape(3, 3), np.eye(3))
+    return foxglove.mcap([("depth", "dai.proto.img_frame.ImgFrame", frame)])
+
+
 # --- By other libraries.
 
 
@@ -228,6 +259,10 @@ MAKERS: dict[str, Callable[[], bytes]] = {
     "ros2.mcap": lambda: ros2(mcap=True),
     "ros2-zstd.mcap": lambda: ros2(mcap=True, compression="zstd"),
     "ros2-png.mcap": compressed_raw,
+    "ros1-rvl.bag": compressed_rvl,
+    "foxglove.mcap": lambda: _foxglove("protobuf"),
+    "foxglove-json.mcap": lambda: _foxglove("json"),
+    "oak.mcap": _oak,
     "kinect.mkv": mkv,
     "cloud.e57": e57,
 }

@@ -136,7 +136,7 @@ BAD_TIFF = {
     "header only": (b"II*\0", "damaged TIFF"),
     "cut": (made.tiff(made.RAW)[:2000], "damaged|TIFF"),
     "bomb": (big_endian_tiff(19_000, 5_000, b"\0" * 64), "can't hold the declared 190000000"),
-    "zstd": (made.tiff(made.RAW, "zstd"), "compression ZSTD"),
+    "JPEG": (made.tiff(made.LABELS, "jpeg"), "picture|JPEG|Jpeg"),
 }
 
 

@@ -12,6 +12,9 @@ import siloscope
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, print_json
 from siloscope.cli.progress import track
+from siloscope.io.first_frame import look
+from siloscope.io.recordings.contents import NothingToRead
+from siloscope.io.source import FrameSource
 
 
 def info(
@@ -28,14 +31,22 @@ def info(
 
     With --check, exit code 5 tells that some frames are damaged.
     """
-    with siloscope.open(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
+    with _opened(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
         read = sum(1 for _ in track(source, "reading")) if check else None
-        document = source.describe() | ({"read": read} if check else {})
+        document = source.describe() | {"first_frame": look(source)} | ({"read": read} if check else {})
     if as_json:
         print_json(document)
     else:
         print_description(document)
     return PARTIAL if check and document["problems"] else 0
+
+
+def _opened(file: Path, **options: Any) -> FrameSource:
+    """The source; of a recording without depth and points, one that lists what it has."""
+    try:
+        return siloscope.open(file, **options)
+    except NothingToRead as nothing:
+        return nothing.source
 
 
 def print_description(document: dict[str, Any]) -> None:
@@ -56,11 +67,13 @@ def rows(document: dict[str, Any]) -> list[tuple[str, str]]:
         ("file", f"{document['file']} ({document['format']})"),
         ("frames", _frames(document)),
         *((f"stream {'*' if stream.get('chosen') else ' '}", _stream(stream)) for stream in document["streams"]),
+        ("first frame", _first_frame(document.get("first_frame"))),
         ("camera", _camera(document)),
         ("depth unit", _unit(document)),
         ("gravity", _gravity(document["gravity"])),
         ("time", _time(document["timestamps"])),
         *((key.replace("_", " "), _short(value)) for key, value in document["provenance"].items() if key not in _SHOWN),
+        *((f"topic {'*' if topic['read'] else ' '}", _topic(topic)) for topic in document["topics"]),
         *(("problem", problem) for problem in document["problems"]),
     ]
     return [(key, text) for key, text in known if text]
@@ -80,6 +93,26 @@ def _stream(stream: dict[str, Any]) -> str:
     frames = stream.get("frames")
     count = "" if frames is None else f", {frames} {'frame' if frames == 1 else 'frames'}"
     return f"{stream.get('name')}: {stream.get('kind')}, {size} {what}, {stream.get('dtype') or 'type unknown'}{count}"
+
+
+def _topic(topic: dict[str, Any]) -> str:
+    count = topic["messages"]
+    return f"{topic['name']}: {topic['type']}, {count} {'message' if count == 1 else 'messages'}: {topic['note']}"
+
+
+def _first_frame(numbers: dict[str, Any] | None) -> str:
+    if numbers is None:
+        return ""
+    invalid = f"{100 * numbers['invalid']:.1f} % without measurement"
+    if extent := numbers.get("extent"):
+        sides = ", ".join(f"{axis} {least:.3f} to {most:.3f}" for axis, (least, most) in extent.items())
+        return f"{sides} m, {invalid}"
+    depth = numbers.get("depth", {})
+    if "median" not in depth:
+        return invalid
+    unit, digits = ("raw units", 0) if depth["unit"] == "raw" else ("m", 3)
+    least, median, most = (f"{depth[key]:.{digits}f}" for key in ("least", "median", "most"))
+    return f"depth {least} to {most} {unit}, median {median}, {invalid}"
 
 
 def _camera(document: dict[str, Any]) -> str:

@@ -15,6 +15,7 @@ from pathlib import Path
 from siloscope.errors import InputError, UsageError
 from siloscope.io.camera_sizes import Known
 from siloscope.io.chain import Chain, Unreadable
+from siloscope.io.registry import unread, without_header
 from siloscope.io.source import HEAD_BYTES, Format, FrameSource, Item, Options
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
@@ -97,9 +98,16 @@ def sniff(path: StrPath) -> Format:
     """The format of a file or folder, from its content; raises `InputError` where none fits."""
     path = Path(path)
     head = _head(path)
-    for known in formats():
+    *marked, text = formats()
+    for known in marked:
         if known.sniff(head, path):
             return known
+    if other := unread(head, path):  # some are text with numbers in it
+        raise InputError(f"{path}: is {other.name}, which is not read; {other.advice}")
+    if text.sniff(head, path):
+        return text
+    if other := without_header(head, path):
+        raise InputError(f"{path}: is {other.name}, which is not read; {other.advice}")
     names = ", ".join(known.name for known in formats())
     found = "a folder with nothing readable in it" if path.is_dir() else f"content starting with {head[:16]!r}"
     raise InputError(f"{path}: {found} is of no known format; formats read are {names}")

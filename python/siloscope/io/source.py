@@ -131,6 +131,10 @@ class FrameSource(ABC):
         or number of points), ``dtype``, ``frames`` and ``chosen``."""
         return []
 
+    def _topics(self) -> list[dict[str, Any]]:
+        """For `describe`: one dictionary a topic of a recording; see `siloscope.io.recordings.contents.listed`."""
+        return []
+
     @property
     def camera(self) -> Camera | None:
         """The user's camera, else the file's, else None."""
@@ -248,7 +252,7 @@ class FrameSource(ABC):
 
     def _nothing_read(self) -> InputError:
         if not self.problems:
-            return InputError(f"{self.name}: no frames in it; `siloscope info` shows what is")
+            return InputError(f"{self.name}: no frames in it; record or export it again")
         if len(self.problems) == 1:
             (problem,) = self.problems
             return InputError(problem if self.name in problem else f"{self.name}, {problem}")
@@ -265,6 +269,7 @@ class FrameSource(ABC):
             "format": self.format,
             "frames": self._count(),
             "streams": self._streams(),
+            "topics": self._topics(),
             "camera": camera.to_dict() if camera else None,
             "camera_from": "given" if self.options.cameras else self.provenance.get("camera_from"),
             "depth_unit": self.depth_unit,

@@ -5,6 +5,7 @@ mod exr;
 mod lzf;
 mod plain_png;
 mod png;
+mod rvl;
 mod tiff;
 
 use pyo3::prelude::*;
@@ -12,6 +13,7 @@ use pyo3::prelude::*;
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(png::decode_png16, m)?)?;
     m.add_function(wrap_pyfunction!(lzf::decompress_lzf, m)?)?;
+    m.add_function(wrap_pyfunction!(rvl::decompress_rvl, m)?)?;
     m.add_function(wrap_pyfunction!(tiff::tiff_pages, m)?)?;
     m.add_function(wrap_pyfunction!(tiff::decode_tiff, m)?)?;
     m.add_function(wrap_pyfunction!(checksum::checksum, m)?)?;

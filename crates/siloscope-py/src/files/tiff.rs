@@ -4,9 +4,10 @@ use super::png::BEST_DEFLATE_RATIO;
 use crate::convert::value_error;
 use numpy::PyArray1;
 use pyo3::prelude::*;
+use pyo3::pybacked::PyBackedBytes;
 use std::fs::File;
-use std::io::BufReader;
-use std::path::{Path, PathBuf};
+use std::io::{BufReader, Cursor, Read, Seek};
+use std::path::PathBuf;
 use tiff::ColorType;
 use tiff::decoder::{Decoder, DecodingResult, DecodingSampleType, Limits};
 use tiff::tags::{CompressionMethod, Tag};
@@ -18,38 +19,61 @@ const BEST_PACKBITS_RATIO: usize = 64;
 /// More pages than a recording in one file has.
 const MOST_PAGES: usize = 100_000;
 
-type Tiff = Decoder<BufReader<File>>;
-
-/// Width, height and sample type of every page of a TIFF file: a type such as "uint16", or what stands against
-/// reading it as depth. Raises `ValueError` naming the damage.
-#[pyfunction]
-pub fn tiff_pages(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(u32, u32, String)>> {
-    py.detach(|| pages(&path)).map_err(value_error)
+/// A TIFF's bytes, or the file in which it is.
+#[derive(FromPyObject)]
+pub enum Source {
+    /// The whole file.
+    Bytes(PyBackedBytes),
+    /// Where the file is.
+    Path(PathBuf),
 }
 
-/// Decodes one page into its samples, row by row: array (H*W,) of the type in the file. Raises `ValueError` naming
-/// the damage.
+trait Readable: Read + Seek {}
+impl<R: Read + Seek> Readable for R {}
+
+type Tiff<'a> = Decoder<Box<dyn Readable + 'a>>;
+
+/// Width, height, sample type and compression of a page.
+type Page = (u32, u32, String, String);
+
+/// Width, height, sample type and compression of every page of a TIFF: a type such as "uint16", or what stands against
+/// reading it as depth; a compression such as "LZW". Raises `ValueError` naming the damage.
 #[pyfunction]
-pub fn decode_tiff(py: Python<'_>, path: PathBuf, page: usize) -> PyResult<Bound<'_, PyAny>> {
-    let samples = py.detach(|| decode(&path, page)).map_err(value_error)?;
+pub fn tiff_pages(py: Python<'_>, source: Source) -> PyResult<Vec<Page>> {
+    py.detach(|| pages(&source)).map_err(value_error)
+}
+
+/// Decodes one page into its samples, row by row: array (H*W,) of the type in the file, float32 for float16. Raises
+/// `ValueError` naming the damage.
+#[pyfunction]
+pub fn decode_tiff(py: Python<'_>, source: Source, page: usize) -> PyResult<Bound<'_, PyAny>> {
+    let samples = py.detach(|| decode(&source, page)).map_err(value_error)?;
     Ok(match samples {
         DecodingResult::U16(v) => PyArray1::from_vec(py, v).into_any(),
         DecodingResult::U32(v) => PyArray1::from_vec(py, v).into_any(),
         DecodingResult::I16(v) => PyArray1::from_vec(py, v).into_any(),
         DecodingResult::I32(v) => PyArray1::from_vec(py, v).into_any(),
+        DecodingResult::F16(v) => PyArray1::from_iter(py, v.into_iter().map(|sample| sample.to_f32())).into_any(),
         DecodingResult::F32(v) => PyArray1::from_vec(py, v).into_any(),
         DecodingResult::F64(v) => PyArray1::from_vec(py, v).into_any(),
         _ => return Err(value_error("samples of a type that is no depth")),
     })
 }
 
-fn open(path: &Path) -> Result<Tiff, String> {
-    let file = File::open(path).map_err(|e| e.to_string())?;
-    Decoder::new(BufReader::new(file)).map_err(|e| e.to_string())
+fn open(source: &Source) -> Result<(Tiff<'_>, usize), String> {
+    let (reader, size): (Box<dyn Readable>, usize) = match source {
+        Source::Bytes(data) => (Box::new(Cursor::new(&data[..])), data.len()),
+        Source::Path(path) => {
+            let file = File::open(path).map_err(|e| e.to_string())?;
+            let size = file.metadata().map_err(|e| e.to_string())?.len() as usize;
+            (Box::new(BufReader::new(file)), size)
+        }
+    };
+    Ok((Decoder::new(reader).map_err(|e| e.to_string())?, size))
 }
 
-fn pages(path: &Path) -> Result<Vec<(u32, u32, String)>, String> {
-    let mut file = open(path)?;
+fn pages(source: &Source) -> Result<Vec<Page>, String> {
+    let (mut file, _) = open(source)?;
     let mut found = vec![page(&mut file)?];
     while file.more_images() {
         file.next_image().map_err(|e| e.to_string())?;
@@ -61,12 +85,12 @@ fn pages(path: &Path) -> Result<Vec<(u32, u32, String)>, String> {
     Ok(found)
 }
 
-fn page(file: &mut Tiff) -> Result<(u32, u32, String), String> {
+fn page(file: &mut Tiff<'_>) -> Result<Page, String> {
     let (width, height) = file.dimensions().map_err(|e| e.to_string())?;
-    Ok((width, height, sample_type(file)?))
+    Ok((width, height, sample_type(file)?, format!("{:?}", compression(file)?)))
 }
 
-fn sample_type(file: &mut Tiff) -> Result<String, String> {
+fn sample_type(file: &mut Tiff<'_>) -> Result<String, String> {
     match file.colortype().map_err(|e| e.to_string())? {
         ColorType::Gray(_) => {}
         other => return Ok(format!("{other:?}")),
@@ -77,15 +101,15 @@ fn sample_type(file: &mut Tiff) -> Result<String, String> {
         Some(DecodingSampleType::U32) => "uint32".into(),
         Some(DecodingSampleType::I16) => "int16".into(),
         Some(DecodingSampleType::I32) => "int32".into(),
+        Some(DecodingSampleType::F16) => "float16".into(),
         Some(DecodingSampleType::F32) => "float32".into(),
         Some(DecodingSampleType::F64) => "float64".into(),
         other => other.map_or("unknown samples".into(), |kind| format!("{kind:?}")),
     })
 }
 
-fn decode(path: &Path, page: usize) -> Result<DecodingResult, String> {
-    let there = std::fs::metadata(path).map_err(|e| e.to_string())?.len() as usize;
-    let mut file = open(path)?;
+fn decode(source: &Source, page: usize) -> Result<DecodingResult, String> {
+    let (mut file, there) = open(source)?;
     file.seek_to_image(page).map_err(|e| e.to_string())?;
     let most = there.saturating_mul(best_ratio(&mut file)?);
     let declared = file.image_buffer_layout().map_err(|e| e.to_string())?.len;
@@ -98,10 +122,14 @@ fn decode(path: &Path, page: usize) -> Result<DecodingResult, String> {
     file.with_limits(limits).read_image().map_err(|e| e.to_string())
 }
 
-/// How many times smaller the page's compression can make it, which bounds what the file can hold.
-fn best_ratio(file: &mut Tiff) -> Result<usize, String> {
+fn compression(file: &mut Tiff<'_>) -> Result<CompressionMethod, String> {
     let method = file.find_tag_unsigned::<u16>(Tag::Compression).map_err(|e| e.to_string())?.unwrap_or(1);
-    match CompressionMethod::from_u16_exhaustive(method) {
+    Ok(CompressionMethod::from_u16_exhaustive(method))
+}
+
+/// How many times smaller the page's compression can make it, which bounds what the file can hold.
+fn best_ratio(file: &mut Tiff<'_>) -> Result<usize, String> {
+    match compression(file)? {
         CompressionMethod::None => Ok(1),
         CompressionMethod::LZW => Ok(BEST_LZW_RATIO),
         CompressionMethod::Deflate | CompressionMethod::OldDeflate => Ok(BEST_DEFLATE_RATIO),

@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+import io
+import struct
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from siloscope import _core
 from siloscope.errors import InputError
@@ -14,10 +19,15 @@ from siloscope.io.source import Format, FrameSource, Item, Options, check_image_
 from siloscope.types.frame import Frame
 
 MAGICS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
-_TYPES = ("uint16", "int16", "uint32", "int32", "float32", "float64")
+_TYPES = ("uint16", "int16", "uint32", "int32", "float16", "float32", "float64")
 
-Page = tuple[int, int, str]
-"""Width, height and sample type."""
+Page = tuple[int, int, str, str]
+"""Width, height, sample type and compression."""
+
+_BY_PILLOW = "ZSTD"
+"""The compression that Pillow undoes: the Rust decoder would need a second copy of Zstandard."""
+_BEST_RATIO = 1032
+"""How many times smaller depth gets at most, as by deflate; more is a damaged or hostile file."""
 
 
 class TiffSource(FrameSource):
@@ -37,30 +47,55 @@ class TiffSource(FrameSource):
         return len(self._pages)
 
     def _streams(self) -> list[dict[str, Any]]:
-        width, height, kind = self._pages[0]
+        width, height, kind, _ = self._pages[0]
         stream = {"name": "depth", "kind": "depth", "size": [width, height], "dtype": kind}
         return [{**stream, "frames": len(self._pages), "chosen": True}]
 
 
 def read_pages(path: Path) -> list[Page]:
     """Sizes and types of all pages; raises `InputError` where the first is no depth image."""
+    return read_pages_of(str(path), path)
+
+
+def read_pages_of(name: str, source: Path | bytes) -> list[Page]:
+    """The same for a file or the bytes of one."""
     try:
-        pages = _core.tiff_pages(path)
+        pages = _core.tiff_pages(source)
     except ValueError as error:
-        raise InputError(f"{path}: damaged TIFF ({error}); export the frame again") from None
-    _check(path, pages[0])
+        raise InputError(f"{name}: damaged TIFF ({error}); export the frame again") from None
+    _check(name, pages[0])
     return pages
 
 
 def read_page(path: Path, index: int, page: Page) -> Frame:
     """The depth image of one page, in raw units or metres."""
-    _check(path, page)
-    width, height, _ = page
+    return Frame(depth=decode_page(str(path), path, index, page), source=str(path))
+
+
+def decode_page(name: str, source: Path | bytes, index: int, page: Page) -> NDArray[Any]:
+    """Depth (H, W) of one page of a file or the bytes of one."""
+    _check(name, page)
+    width, height, _, compression = page
+    decode = _decode_by_pillow if compression == _BY_PILLOW else _core.decode_tiff
     try:
-        depth = _core.decode_tiff(path, index).reshape(height, width)
+        depth: NDArray[Any] = decode(source, index).reshape(height, width)
     except ValueError as error:
-        raise InputError(f"{path}: page {index} is damaged or not read ({error}); export the frame again") from None
-    return Frame(depth=depth, source=str(path))
+        raise InputError(f"{name}: page {index} is damaged or not read ({error}); export the frame again") from None
+    return depth
+
+
+def _decode_by_pillow(source: Path | bytes, index: int) -> NDArray[Any]:
+    from PIL import Image
+
+    data = source if isinstance(source, bytes) else source.read_bytes()
+    try:
+        with Image.open(io.BytesIO(data), formats=["TIFF"]) as image:
+            image.seek(index)
+            if image.width * image.height * 4 > len(data) * _BEST_RATIO:
+                raise ValueError(f"{len(data)} bytes can't hold {image.width} x {image.height} pixels")
+            return np.array(image)
+    except (OSError, SyntaxError, EOFError, KeyError, TypeError, OverflowError, struct.error) as error:
+        raise ValueError(error) from None
 
 
 def read(path: Path) -> Frame:
@@ -68,13 +103,13 @@ def read(path: Path) -> Frame:
     return read_page(path, 0, read_pages(path)[0])
 
 
-def _check(path: Path, page: Page) -> None:
-    width, height, kind = page
+def _check(name: str, page: Page) -> None:
+    width, height, kind, _ = page
     if kind not in _TYPES:
         raise InputError(
-            f"{path}: a TIFF of {kind} is a picture, not depth; export 16-bit grey or floating-point metres"
+            f"{name}: a TIFF of {kind} is a picture, not depth; export 16-bit grey or floating-point metres"
         )
-    check_image_size(str(path), width, height)
+    check_image_size(name, width, height)
 
 
 FORMAT = Format("tiff", lambda head, path: head.startswith(MAGICS), TiffSource, read_one=read)

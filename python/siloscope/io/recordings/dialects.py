@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 from siloscope.errors import InputError
-from siloscope.io.recordings.recorded import Undecided
+from siloscope.io.recordings.contents import Contents, NothingToRead, listed, summary
 from siloscope.io.recordings.recording import Recording
-from siloscope.io.recordings.streams import SeveralStreams
+from siloscope.io.recordings.streams import NoStreams, SeveralStreams
 from siloscope.io.source import FrameSource, Options
 
 
@@ -22,8 +22,14 @@ def source(path: Path, format: str, options: Options, recording: Recording) -> F
             return orbbec.OrbbecSource(path, f"orbbec-{format}", options, recording)
         return ros.RosSource(path, format, options, recording)
     except SeveralStreams as why:
+        topics = listed(recording, why.streams, None)
         recording.close()
-        return Undecided(path, format, options, why.streams, why)
+        return Contents(path, format, options, why, why.streams, topics)
+    except NoStreams as none:
+        topics = listed(recording, (), None)
+        recording.close()
+        told = f"{none}: {summary(topics)}"
+        raise NothingToRead(told, Contents(path, format, options, InputError(told), (), topics)) from None
     except InputError as error:
         recording.close()
         raise error if recording.name in str(error) else InputError(f"{recording.name}: {error}") from None

@@ -9,25 +9,11 @@ from pathlib import Path
 from typing import Any
 
 from siloscope.errors import InputError
+from siloscope.io.recordings.contents import listed
 from siloscope.io.recordings.recording import Entry, Recording
 from siloscope.io.recordings.streams import Stream, choose, described
 from siloscope.io.source import FrameSource, Item, Options
 from siloscope.types.frame import Frame
-
-
-class Undecided(FrameSource):
-    """A recording with several streams: `describe` lists them, iterating asks which."""
-
-    def __init__(self, path: Path, format: str, options: Options, streams: Sequence[Stream], why: InputError) -> None:
-        super().__init__(path, format, options)
-        self.streams, self.why = streams, why
-        self.problems = [str(why)]
-
-    def _items(self) -> Iterator[Item]:
-        raise self.why
-
-    def _streams(self) -> list[dict[str, Any]]:
-        return described(self.streams, None)
 
 
 class RecordedSource(FrameSource):
@@ -67,6 +53,9 @@ class RecordedSource(FrameSource):
 
     def _streams(self) -> list[dict[str, Any]]:
         return described(self.streams, self.stream)
+
+    def _topics(self) -> list[dict[str, Any]]:
+        return listed(self.recording, self.streams, self.stream)
 
     def close(self) -> None:
         """Lets go of the file."""

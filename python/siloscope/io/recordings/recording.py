@@ -34,8 +34,10 @@ class Topic(NamedTuple):
     name: str
     type: str
     encoding: str
-    """``ros1`` or ``cdr``."""
+    """``ros1``, ``cdr``, ``protobuf`` or ``json``; others are not read."""
     entries: list[Entry]
+    schema: bytes = b""
+    """What describes its messages, for Protocol Buffers a ``FileDescriptorSet``."""
 
 
 class Recording(ABC):
@@ -64,10 +66,10 @@ class Recording(ABC):
     def close(self) -> None:
         """Lets go of the file."""
 
-    def declare(self, name: str, type: str, encoding: str) -> Topic:
+    def declare(self, name: str, type: str, encoding: str, schema: bytes = b"") -> Topic:
         """The topic of this name, made where it is new."""
         plain = type.replace("/msg/", "/")
-        return self.topics.setdefault(name, Topic(name, plain, encoding, []))
+        return self.topics.setdefault(name, Topic(name, plain, encoding, [], schema))
 
     def of_type(self, *types: str) -> Iterator[Topic]:
         """Topics of these types that have messages."""
@@ -85,7 +87,9 @@ def wire(encoding: str, data: Buffer) -> Wire:
         return Wire(data)
     if encoding == "cdr":
         return Cdr(_unpacked(bytes(data)) if data[:4] == _ZSTD else data)
-    raise InputError(f"messages are encoded as '{encoding}'; read are ros1 and cdr")
+    if encoding in ("protobuf", "json"):
+        return Wire(data)
+    raise InputError(f"messages are encoded as '{encoding}'; read are ros1, cdr, protobuf and json")
 
 
 def _unpacked(data: bytes) -> bytes:

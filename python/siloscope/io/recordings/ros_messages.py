@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import struct
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 
 from siloscope.errors import InputError
 from siloscope.io import camera_files
-from siloscope.io.images import png
 from siloscope.io.recordings.wire import Header, Wire
 from siloscope.io.source import check_image_size
 from siloscope.types.camera import Camera
@@ -59,54 +57,6 @@ def depth_pixels(image: Image) -> NDArray[np.uint16] | NDArray[np.float32]:
     rows = np.frombuffer(image.data, np.uint8, image.step * image.height).reshape(image.height, image.step)
     pixels = np.ascontiguousarray(rows[:, : image.width * size]).view(order + kind)
     return pixels.astype(kind, copy=False)
-
-
-class CompressedImage(NamedTuple):
-    """``sensor_msgs/CompressedImage``."""
-
-    header: Header
-    format: str
-    data: memoryview
-
-
-def read_compressed_image(wire: Wire) -> CompressedImage:
-    """``sensor_msgs/CompressedImage``."""
-    return CompressedImage(wire.header(), wire.string(), wire.blob())
-
-
-def decompress_depth(image: CompressedImage) -> NDArray[np.uint16] | NDArray[np.float32]:
-    """Depth (H, W) of the ``compressedDepth`` transport: a 12-byte header, then a PNG.
-
-    16UC1 is the PNG itself, uint16. 32FC1 is inverse depth q quantised into the PNG: with the header's A and B the
-    depth is ``A / (q - B)``, and 0 is "no measurement"; float32 in metres, NaN where there is none.
-    """
-    encoding = image.format.split(";")[0].strip()
-    if "rvl" in image.format.lower():
-        raise InputError("depth is compressed with RVL, which is not read; record the raw or the PNG topic")
-    start, quantised = _png_start(image.data)
-    raw = png.decode("compressed depth", bytes(image.data[start:]))
-    if encoding != "32FC1":
-        return np.asarray(raw, dtype=np.uint16)
-    if quantised is None:
-        raise InputError("32FC1 depth without its quantisation header")
-    return _from_inverse_depth(raw, *quantised)
-
-
-def _png_start(data: memoryview) -> tuple[int, tuple[float, float] | None]:
-    if bytes(data[:8]) == png.MAGIC:
-        return 0, None
-    if bytes(data[12:20]) != png.MAGIC:
-        raise InputError("compressed depth without a PNG")
-    _, a, b = struct.unpack("<iff", data[:12])
-    return 12, (a, b)
-
-
-def _from_inverse_depth(raw: NDArray[np.uint16], a: float, b: float) -> NDArray[np.float32]:
-    if not (math.isfinite(a) and math.isfinite(b) and a > 0):
-        raise InputError(f"32FC1 depth has no usable quantisation (A = {a}, B = {b})")
-    with np.errstate(divide="ignore", over="ignore"):
-        depth = (np.float64(a) / (raw.astype(np.float64) - b)).astype(np.float32)
-    return np.where((raw > 0) & np.isfinite(depth), depth, np.float32(np.nan))
 
 
 @dataclass(frozen=True)

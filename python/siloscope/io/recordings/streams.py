@@ -35,6 +35,10 @@ class Stream:
     dtype: str | None = None
 
 
+class NoStreams(InputError):
+    """A recording without depth and points."""
+
+
 class SeveralStreams(InputError):
     """Several streams and nothing that says which is meant."""
 
@@ -56,7 +60,7 @@ def choose(name: str, streams: Sequence[Stream], wanted: str | None) -> Stream:
         For a name that fits none or several.
     """
     if not streams:
-        raise InputError(f"{name}: no depth and no points in this recording; `siloscope info` shows what is")
+        raise NoStreams(f"{name}: no depth and no points in this recording")
     if wanted is not None:
         return _named(name, streams, wanted)
     candidates = [stream for stream in streams if stream.kind == "depth"] or list(streams)

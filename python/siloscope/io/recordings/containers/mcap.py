@@ -23,7 +23,7 @@ class Mcap(FileRecording):
 
     def __init__(self, path: Path) -> None:
         super().__init__(path)
-        self._schemas: dict[int, str] = {}
+        self._schemas: dict[int, tuple[str, bytes]] = {}
         self._channels: dict[int, Topic] = {}
         self._chunks: list[tuple[str, int, int, int, int]] = []
         self._read_index()
@@ -49,11 +49,13 @@ class Mcap(FileRecording):
         record = Wire(data)
         number = record.u16()
         if kind == _SCHEMA:
-            self._schemas[number] = record.string()
+            name, _ = record.string(), record.string()
+            self._schemas[number] = name, bytes(record.blob())
             return
         schema = record.u16()
         topic, encoding = record.string(), record.string()
-        self._channels[number] = self.declare(topic, self._schemas.get(schema, ""), encoding)
+        name, described = self._schemas.get(schema, ("", b""))
+        self._channels[number] = self.declare(topic, name, encoding, described if encoding == "protobuf" else b"")
 
     def _add_chunk(self, at: int, size: int) -> None:
         head = Wire(self._bytes(at, min(size, 64, self.size - at)))

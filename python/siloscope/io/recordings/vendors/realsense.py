@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.io.recordings import gravity, ros_messages
+from siloscope.io.recordings.compressed_depth import decompress, read_compressed_image
 from siloscope.io.recordings.recorded import RecordedSource
 from siloscope.io.recordings.recording import Entry, Recording, Topic, or_none
 from siloscope.io.recordings.streams import Stream
@@ -58,7 +59,7 @@ class RealSenseSource(RecordedSource):
         wire = self.recording.read(self.stream.topic, entry)
         unit = self._units.get(entry.time_ns)
         if self.stream.topic.type == "sensor_msgs/CompressedImage":
-            depth = ros_messages.decompress_depth(ros_messages.read_compressed_image(wire))
+            depth = decompress(read_compressed_image(wire), transported=True)
         else:
             image = ros_messages.read_image(wire)
             unit, depth = _unit_after(image) or unit, ros_messages.depth_pixels(image)

@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.io.recordings import gravity, ros_messages
+from siloscope.errors import InputError
+from siloscope.io.recordings import compressed_depth, gravity, messages, ros_messages
+from siloscope.io.recordings.messages import CAMERAS, CLOUDS, COMPRESSED, IMAGES, OAK
 from siloscope.io.recordings.recorded import RecordedSource
 from siloscope.io.recordings.recording import Entry, Recording, Topic, or_none
 from siloscope.io.recordings.streams import Stream
@@ -18,7 +20,6 @@ from siloscope.io.source import Options
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
 
-_IMAGE, _COMPRESSED, _CLOUD = "sensor_msgs/Image", "sensor_msgs/CompressedImage", "sensor_msgs/PointCloud2"
 _INFRARED = re.compile(r"/(ir|infra)", re.IGNORECASE)
 _MILLIMETRES = 0.001
 """Unit of 16UC1 depth in ROS (REP 118)."""
@@ -33,15 +34,16 @@ class RosSource(RecordedSource):
         self.provenance["frame_id"] = self.frame_id
         if self.stream.kind == "depth":
             self.file_camera = self._camera()
+        if self.stream.dtype == "uint16":
+            self.file_depth_unit = _MILLIMETRES
+            self.provenance["depth_unit_from"] = "ROS (16UC1 is millimetres)"
         self.gravity, self.provenance["gravity_from"] = self._gravity()
 
     def _decode(self, entry: Entry) -> Frame:
-        frame = decode(self.recording, self.stream, entry)
-        return Frame(**frame, timestamp=self._time(entry), provenance=_unit_origin(frame))
+        return Frame(**decode(self.recording, self.stream, entry), timestamp=self._time(entry))
 
     def _first_frame_id(self) -> str:
-        wire = or_none(self.recording.read, self.stream.topic, self.stream.topic.entries[0])
-        header = or_none(wire.header) if wire else None
+        header = or_none(messages.header, self.recording, self.stream.topic, self.stream.topic.entries[0])
         return header.frame_id.lstrip("/") if header else ""
 
     def _camera(self) -> Camera | None:
@@ -74,62 +76,78 @@ class RosSource(RecordedSource):
 
 def streams_of(recording: Recording) -> list[Stream]:
     """Depth and point streams; of one topic stored raw and compressed, only the raw one."""
-    found = [or_none(_stream, recording, topic) for topic in recording.of_type(_IMAGE, _COMPRESSED, _CLOUD)]
+    found = [or_none(stream_of, recording, topic) for topic in recording.of_type(*IMAGES, *COMPRESSED, *CLOUDS)]
     streams = [stream for stream in found if stream]
-    raw = {stream.name for stream in streams if stream.topic.type == _IMAGE}
-    return [s for s in streams if s.topic.type != _COMPRESSED or s.name.removesuffix("/compressedDepth") not in raw]
+    raw = {stream.name for stream in streams if stream.topic.type in IMAGES}
+    return [s for s in streams if s.topic.type not in COMPRESSED or _image_of(s.name) not in raw]
 
 
-def _stream(recording: Recording, topic: Topic) -> Stream | None:
-    wire = recording.read(topic, topic.entries[0])
-    if topic.type == _CLOUD:
-        cloud = ros_messages.read_point_cloud(wire)
+def stream_of(recording: Recording, topic: Topic) -> Stream:
+    """The stream that a topic is; raises `InputError`, saying why, where it is no depth."""
+    entry = topic.entries[0]
+    if topic.type in CLOUDS:
+        cloud = messages.cloud(recording, topic, entry)
         size = (cloud.width, cloud.height) if cloud.height > 1 else cloud.width
         return Stream(topic.name, "points", topic, size, "float32")
-    if topic.type == _COMPRESSED:
-        return _compressed_stream(topic, ros_messages.read_compressed_image(wire))
-    image = ros_messages.read_image(wire)
-    depth = image.encoding in ("16UC1", "32FC1") and not _INFRARED.search(topic.name)
-    depth = depth or (image.encoding in ("mono16", "Z16") and "depth" in topic.name.lower())
+    if topic.type in COMPRESSED:
+        return _compressed_stream(topic, messages.compressed(recording, topic, entry))
+    image = messages.image(recording, topic, entry)
+    _check_depth(topic, image.encoding)
     kind = "float32" if image.encoding == "32FC1" else "uint16"
-    return Stream(topic.name, "depth", topic, (image.width, image.height), kind) if depth else None
+    return Stream(topic.name, "depth", topic, (image.width, image.height), kind)
 
 
-def _compressed_stream(topic: Topic, image: ros_messages.CompressedImage) -> Stream | None:
-    if "compresseddepth" not in image.format.lower() and not topic.name.endswith("/compressedDepth"):
-        return None
-    start = bytes(image.data[: 12 + 24])[-24:]
-    size = (int.from_bytes(start[16:20], "big"), int.from_bytes(start[20:24], "big"))
-    return Stream(topic.name, "depth", topic, size, "float32" if image.format.startswith("32FC1") else "uint16")
+def _check_depth(topic: Topic, encoding: str) -> None:
+    """Raises `InputError` for images that are no depth: REP 118 has 16UC1 and 32FC1, drivers mono16 and Z16 too."""
+    if encoding not in ros_messages.DEPTH_ENCODINGS:
+        raise InputError(f"a picture ({encoding or 'no encoding'}), not depth")
+    if _INFRARED.search(topic.name):
+        raise InputError("infrared, by its name")
+    if encoding in ("mono16", "Z16") and "depth" not in topic.name.lower():
+        raise InputError(f"{encoding} without 'depth' in its name is a grey picture")
+
+
+def _compressed_stream(topic: Topic, image: compressed_depth.CompressedImage) -> Stream:
+    size, kind = compressed_depth.shape_of(image, _is_transported(topic, image))
+    if _INFRARED.search(topic.name):
+        raise InputError("infrared, by its name")
+    return Stream(topic.name, "depth", topic, size, kind)
+
+
+def _is_transported(topic: Topic, image: compressed_depth.CompressedImage) -> bool:
+    return compressed_depth.is_transported(image) or topic.name.endswith("/compressedDepth")
+
+
+def _image_of(topic: str) -> str:
+    """The topic of the raw image that a compressed one stands for."""
+    return topic.removesuffix("/compressedDepth").removesuffix("/compressed")
 
 
 def decode(recording: Recording, stream: Stream, entry: Entry) -> dict[str, Any]:
     """Depth or points of one message, as fields of `Frame`."""
-    wire = recording.read(stream.topic, entry)
-    if stream.topic.type == _CLOUD:
-        return {"points": ros_messages.cloud_points(ros_messages.read_point_cloud(wire))}
-    if stream.topic.type == _COMPRESSED:
-        depth = ros_messages.decompress_depth(ros_messages.read_compressed_image(wire))
+    topic = stream.topic
+    if topic.type in CLOUDS:
+        return {"points": ros_messages.cloud_points(messages.cloud(recording, topic, entry))}
+    if topic.type in COMPRESSED:
+        image = messages.compressed(recording, topic, entry)
+        depth = compressed_depth.decompress(image, _is_transported(topic, image))
     else:
-        depth = ros_messages.depth_pixels(ros_messages.read_image(wire))
-    return {"depth": depth, "depth_unit": _MILLIMETRES if depth.dtype == np.uint16 else None}
-
-
-def _unit_origin(frame: dict[str, Any]) -> dict[str, Any]:
-    return {"depth_unit_from": "ROS (16UC1 is millimetres)"} if frame.get("depth_unit") else {}
+        depth = ros_messages.depth_pixels(messages.image(recording, topic, entry))
+    return {"depth": depth}
 
 
 def _info_of(recording: Recording, stream: Stream, frame_id: str) -> tuple[str, ros_messages.CameraInfo] | None:
     """The camera_info beside the image's topic, else the only one of the image's frame and size."""
+    if stream.topic.type == OAK:
+        own = or_none(_read_info, recording, stream.topic)
+        return ("the image's transformation", own) if own else None
     infos = {
-        topic.name: info
-        for topic in recording.of_type("sensor_msgs/CameraInfo")
-        if (info := or_none(_read_info, recording, topic))
+        topic.name: info for topic in recording.of_type(*CAMERAS) if (info := or_none(_read_info, recording, topic))
     }
-    image = stream.name.removesuffix("/compressedDepth")
-    beside = image.rsplit("/", 1)[0] + "/camera_info"
-    if beside in infos:
-        return beside, infos[beside]
+    beside = _image_of(stream.name).rsplit("/", 1)[0]
+    for name in (f"{beside}/camera_info", f"{beside}/calibration"):
+        if name in infos:
+            return name, infos[name]
     same = [
         (name, info)
         for name, info in infos.items()
@@ -139,11 +157,11 @@ def _info_of(recording: Recording, stream: Stream, frame_id: str) -> tuple[str, 
 
 
 def _is_rectified(topic: str) -> bool:
-    return topic.removesuffix("/compressedDepth").rsplit("/", 1)[-1].startswith("image_rect")
+    return _image_of(topic).rsplit("/", 1)[-1].startswith("image_rect")
 
 
 def _read_info(recording: Recording, topic: Topic) -> ros_messages.CameraInfo:
-    return ros_messages.read_camera_info(recording.read(topic, topic.entries[0]))
+    return messages.camera_info(recording, topic, topic.entries[0])
 
 
 def _transforms(recording: Recording, topic: Topic) -> list[ros_messages.Transform]:
