@@ -18,16 +18,16 @@ CHI2_MOVE = 50.0
 """Least squared distance between the poses before and after, for 4 degrees of freedom (chance: 4e-10)."""
 
 MIN_TURN = 5e-4
-"""Turns below this are not worth telling, rad."""
+"""Smallest reported turn, rad."""
 
 MIN_SHIFT = 1e-3
-"""Shifts below this are not worth telling, m."""
+"""Smallest reported shift, m."""
 
 FEW_STARTS = 4
 """Starts of the robust fits while looking for the place."""
 
 PLACES = 16
-"""Places tried at a time."""
+"""Places tried in one round of the search."""
 
 MOVING = (0, 1, 2, 3, 6, 10, 11)
 """Parameters that a move changes: the pose, the cone's intercept, which is counted from the camera's height, and the

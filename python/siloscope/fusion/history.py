@@ -57,10 +57,10 @@ def _record(number: int, answer: LocatedFrame) -> FrameRecord:
 
 
 def since_the_last_move(history: History) -> tuple[History, FrameFactors, Fused]:
-    """Only the evidence since the camera last moved, and what it says.
+    """The factors since the last move of the camera, and their common answer.
 
-    With an unknown bias a move is seen sharply only where the frames' equations are made about the bias. The bias is
-    told by frames between which the camera has not moved; so moves are looked for twice where there may be one.
+    If the bias is unknown, a move shows clearly only with equations at the right bias, and the bias follows only from
+    frames without a move between them. So moves are searched twice if there may be one.
     """
     factors = _factors(history)
     found = _fused_since(history, factors, find_moves(factors, history.earlier))
@@ -88,7 +88,7 @@ def _factors(history: History) -> FrameFactors:
 
 
 def _check_common(factors: FrameFactors) -> None:
-    """What was told of a parameter that a frame does not estimate must be the same in all: one sensor profile.
+    """Parameters that a frame does not estimate must have the same given value in all: one sensor profile.
 
     The frames' own values may differ: a bias that the diameter tells is left where it is in a frame without cylinder.
     """

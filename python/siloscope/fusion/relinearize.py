@@ -1,10 +1,10 @@
-"""Frames of a sensor whose depth error is unknown, looked at again from what they have in common.
+"""Relinearises frame factors at the frames' common answer, for a sensor whose depth bias is unknown.
 
-A frame's equations hold near the place where they were made. Where the bias has to be told together with the wall, the
-frame leaves a valley open, and the valley is bent: offset and quadratic error against size, place and tilt. Where the
-straight lines through far ends of bent valleys cross is not where the valleys do. Each frame keeps some of its rays,
-and in the readings that walls predict on them its valley is straight (`_core.surface_seen_from`); so its equations are
-carried to the frames' common answer, which thereby is the minimum of the sum of the bent valleys.
+A frame's equations hold near their linearization point. A frame that estimates the depth bias together with the wall
+has a likelihood with a bent valley: offset and quadratic error against radius, position and tilt. Two bent valleys do
+not meet where the straight lines through their far ends meet. Each frame keeps some of its rays. In the readings that
+walls predict on these rays the valley is straight (`_core.surface_seen_from`). So the equations are mapped to the
+frames' common answer, which then is the minimum of the sum of the bent valleys.
 """
 
 from __future__ import annotations
@@ -21,33 +21,33 @@ from siloscope.types.frame_factor import Matrix, SummedFactor, Vector
 DEPTH_BIAS = slice(BIAS, BIAS + 3)
 
 MAX_ROUNDS = 10
-"""Most times that the frames are carried to a new common answer."""
+"""Largest number of relinearisations."""
 
 SAMPLED_FRAMES = 48
-"""So many of the frames, evenly among them, tell the common answer well enough to make equations about it."""
+"""Number of frames, evenly spaced, from which the common answer is found; enough for a linearization point."""
 
 CONVERGENCE_TOL = 0.05
-"""The answer has settled where it changes by less than this share of its standard deviation."""
+"""Change of the answer, in its standard deviations, below which it has converged."""
 
 STEPS = 2
-"""Newton steps of a frame to where it stands with a given bias."""
+"""Newton steps that move a frame to its answer at a given bias."""
 
 LARGEST_CHANGE = 10.0
 """Most that the logarithm of the determinant of a frame's information may change; else the frame is left as it is."""
 
 
 def bias_is_free(factors: FrameFactors) -> bool:
-    """Whether a frame had to tell the depth bias itself."""
+    """Whether a frame had to estimate the depth bias."""
     return bool(factors.free[:, DEPTH_BIAS].any())
 
 
 def at_bias(factors: FrameFactors, common: Vector) -> FrameFactors:
-    """The frames with equations about where each of them stands with the bias of the `common` answer (12,)."""
+    """The frames, each linearised at its own answer with the bias of the `common` answer (12,)."""
     return _relinearized_at(factors, _with_bias(factors, common[DEPTH_BIAS]))
 
 
 def relinearized(factors: FrameFactors, earlier: SummedFactor | None = None) -> FrameFactors:
-    """The frames with equations about their common answer; as they are where the sensor's bias is known."""
+    """The frames, linearised at their common answer; unchanged if the sensor's bias is known."""
     if not bias_is_free(factors):
         return factors
     some = factors.take(np.unique(np.linspace(0, factors.count - 1, SAMPLED_FRAMES).round().astype(np.intp)))
@@ -56,7 +56,7 @@ def relinearized(factors: FrameFactors, earlier: SummedFactor | None = None) -> 
 
 
 def _common(factors: FrameFactors, earlier: SummedFactor | None) -> Vector:
-    """The answer about which the frames' equations give the same answer again."""
+    """The fixed point: the answer at which the frames' equations give the same answer again."""
     found = fuse(factors, earlier)
     found = fuse(at_bias(factors, found.parameters), earlier)
     for _ in range(MAX_ROUNDS):
@@ -69,12 +69,12 @@ def _common(factors: FrameFactors, earlier: SummedFactor | None) -> Vector:
 
 
 def _own(factors: FrameFactors) -> Matrix:
-    """The frames' answers (N, 12), and what was taken for granted."""
+    """The frames' answers (N, 12); fixed parameters at their given values."""
     return np.where(factors.seen, factors.answers, factors.linearization_point)
 
 
 def _with_bias(factors: FrameFactors, bias: Vector) -> Matrix:
-    """Where each frame stands (N, 12) with a given bias."""
+    """Each frame's answer (N, 12) at a given bias."""
     free = factors.free.copy()
     free[:, DEPTH_BIAS] = False
     place = _own(factors)
@@ -86,7 +86,7 @@ def _with_bias(factors: FrameFactors, bias: Vector) -> Matrix:
 
 
 def _relinearized_at(factors: FrameFactors, place: Matrix) -> FrameFactors:
-    """The frames with equations made anew, each at its row of `place` (N, 12)."""
+    """The frames, each linearised at its row of `place` (N, 12)."""
     information, gradient, jacobian = _linearized_at(factors, place)
     step = _newton(factors, place, information, gradient, factors.free)
     change = _log_determinant(factors, information) - _log_determinant(factors, factors.information)
@@ -101,7 +101,7 @@ def _relinearized_at(factors: FrameFactors, place: Matrix) -> FrameFactors:
 
 
 def _linearized_at(factors: FrameFactors, place: Matrix) -> tuple[Matrix, Matrix, Matrix]:
-    """Information and gradient of the frames at `place`, and what turned them."""
+    """Information and gradient of the frames at `place`, and the Jacobian of the parameter map."""
     step, jacobian = _core.surface_seen_from(factors.linearization_point, factors.rays, factors.free, place)
     from_answer = step + np.nan_to_num(factors.linearization_point - factors.answers)
     gradient = factors.gradient + np.einsum("nij,nj->ni", factors.information, from_answer)

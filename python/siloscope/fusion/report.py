@@ -21,16 +21,16 @@ from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry, geometry_of
 
 MAX_KEPT_FACTORS = 300
-"""So many frames keep their own evidence in a calibration; older ones are added up."""
+"""Number of frames that keep their own factor in a calibration; older ones are added up."""
 
 MAX_DIRECTION_STD = 0.02
 """Largest standard deviation of the axis' direction that still is an answer, rad."""
 
 MAX_POSITION_STD = 0.05
-"""Largest standard deviation of the axis' position that still is an answer, as a share of the silo's radius."""
+"""Largest standard deviation of the axis' position that still is an answer, as a fraction of the silo's radius."""
 
 MANY_FRACTION = 0.25
-"""Share of the frames that are many when they disagree with the rest."""
+"""Fraction of disagreeing frames from which on a remark is made."""
 
 
 def calibration_of(history: History, rule: str, config: dict[str, Any]) -> Calibration:

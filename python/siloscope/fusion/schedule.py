@@ -72,9 +72,9 @@ class FrameLocator:
 
 
 def located(frames: Iterable[Any], one: FrameLocator, pool: Executor | Inline, ahead: int) -> Iterator[LocatedFrame]:
-    """The frames located in order; the next ones are read and located in `pool`, so many `ahead`.
+    """The located frames in order; up to `ahead` further frames are read and located in `pool`.
 
-    Which frame starts from which answer is settled by their order alone, so that the pool doesn't change any answer.
+    The order alone decides which frame starts from which answer, so the pool changes no answer.
     """
     waiting: deque[Future[Located] | Done[Located]] = deque()
     starts = WarmStartSchedule()
@@ -88,9 +88,9 @@ def located(frames: Iterable[Any], one: FrameLocator, pool: Executor | Inline, a
 
 
 class WarmStartSchedule:
-    """Where frames start: a searched one from nothing, the others from the last but one that was searched.
+    """Start of each frame: a fully searched frame has none, the others start from the last but one searched frame.
 
-    The last one may still be at work; only the first frames that are asked whole, or for a quarter, wait for it.
+    The last searched frame may still be in work; only the first frames of each resolution wait for it.
     """
 
     def __init__(self) -> None:
@@ -115,7 +115,7 @@ class WarmStartSchedule:
 
 @contextmanager
 def pool_of(jobs: int) -> Iterator[Executor | Inline]:
-    """Threads for so many jobs at a time; for one, this thread."""
+    """A pool of `jobs` threads; this thread for one job."""
     if jobs == 1:
         yield Inline()
         return

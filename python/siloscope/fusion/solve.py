@@ -1,4 +1,4 @@
-"""Frames of one silo, fused by information: robust centre, weights, and a covariance that contains what they share.
+"""Fuses the frames of one silo by information: robust centre, weights, and a covariance with their common errors.
 
 Notation: frame i has the answer θ_i, its information Λ_i and gradient g_i there (`FrameFactor`), so that its
 negative log-likelihood is ``g_i·δ + δᵀ Λ_i δ / 2`` at θ_i + δ. Priors are common to all frames and enter once.
@@ -17,10 +17,10 @@ from siloscope.parameters import SIZE
 from siloscope.types.frame_factor import Matrix, SummedFactor, Vector
 
 FULL_WEIGHT_SIGMAS = 2.58
-"""A frame counts fully up to this many standard deviations (99 % of a normal variable), not at all beyond √2 times."""
+"""Deviation up to which a frame has full weight (99 % of a normal variable); beyond √2 times this it has none."""
 
 MAX_SIGMAS = 4.0
-"""A frame further from an answer than so many standard deviations costs no more than that."""
+"""Deviation at which a frame's cost is cut off."""
 
 STARTS = 12
 """Frames from which the search for the majority's answer starts."""
@@ -31,7 +31,7 @@ TYPICAL = np.array([1e-3, 1e-3, 5e-3, 5e-3, 5e-3, 5e-3, 2e-2, 5e-3, 1e-2, 5e-3, 
 compared in these units."""
 
 FRACTIONS = tuple(0.25**k for k in range(11))
-"""By how much less than fully what the frames say may count."""
+"""Weights of the frames against the priors that are tried."""
 
 SAME_SIZE_TOL = 0.01
 """Relative difference up to which sizes of covariances are the same: what the frames say counts fully then."""
@@ -47,11 +47,11 @@ class Fused:
     weights: Vector
     """Of each frame, 0 to 1."""
     deviations: Vector
-    """Distance of each frame from the answer: as rare as for a normal variable so many standard deviations off."""
+    """Each frame's distance from the answer, as the equally rare deviation of a normal variable."""
     excess: float
-    """Scatter of the frames over what they state; 1 where they state enough."""
+    """Variance of the frames' scatter over the variance that they state; at least 1."""
     scale_std: float
-    """Standard deviation of the depth scale that nothing could tell; contained in `covariance`."""
+    """Standard deviation of the depth scale where nothing determines it; contained in `covariance`."""
 
     @property
     def disagreeing(self) -> float:
@@ -148,7 +148,7 @@ def _closest(
 
 
 def summed(factors: FrameFactors, weights: Vector, origin: Vector, base: SummedFactor | None = None) -> SummedFactor:
-    """The frames added up, to be gone on with when their own evidence is no longer there."""
+    """The frames added up, for a later continuation without their own factors."""
     start = base or SummedFactor.nothing()
     origin = np.nan_to_num(origin)
     information, pull = _added(factors, weights[None], origin)
@@ -167,7 +167,7 @@ def summed(factors: FrameFactors, weights: Vector, origin: Vector, base: SummedF
 
 
 def _in_common(factors: FrameFactors, weights: Vector, base: SummedFactor) -> Matrix:
-    """Covariance (12, 12) of what the frames may share, added up, however much of it they do share.
+    """Upper bound (12, 12) of the covariance of the frames' summed common errors, for any correlation between them.
 
     For parts ``b`` with covariances E, ``(Σ b)(Σ b)ᵀ ≤ Σ E/α`` for any fractions α > 0 of 1 (Cauchy and Schwarz).
     Fractions as large as the parts themselves keep a few vague frames from standing for all.
@@ -195,7 +195,7 @@ def redescending_weight(deviations: Vector) -> Vector:
 
 
 def prior_of(factors: FrameFactors, weights: Matrix, base: SummedFactor) -> tuple[Vector, Matrix]:
-    """What was known before the frames, once for all of them: information (12,), and mean (K, 12) for K weightings.
+    """The priors, once for all frames: information (12,), and mean (K, 12) for K weightings.
 
     Frames may state different means where each has its own accelerometer reading.
     """
@@ -239,7 +239,7 @@ def _systems(
 ) -> tuple[Matrix, Matrix, Vector, NDArray[np.bool_]]:
     """Normal equations about an origin, and which parameters they determine; the others stay at the origin.
 
-    What the frames say counts by its `fraction` beside what was known before them.
+    The frames count by `fraction` against the priors.
     """
     origin = _origin(factors, base)
     information, pull = _added(factors, weights, origin)
@@ -261,10 +261,10 @@ def _origin(factors: FrameFactors, base: SummedFactor) -> Vector:
 
 
 def _with_covariance(factors: FrameFactors, weights: Vector, excess: float, base: SummedFactor) -> Fused:
-    """The answer by which the pose is known best, however much the frames count beside what was known before them.
+    """The answer with the smallest covariance of the pose over all weights of the frames against the priors.
 
-    Their information is that of their noise alone. Where what they share is larger, they would override what was known
-    as if they were sure of it. Any fraction gives an answer whose covariance is true; the best known one is taken.
+    The frames' information contains their noise alone. If their common errors are larger, the frames would override the
+    priors. Any weight gives an answer with a true covariance; the weight with the smallest covariance is taken.
     """
     origin = _origin(factors, base)
     total = summed(factors, weights, origin, base)

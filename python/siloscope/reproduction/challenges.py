@@ -67,7 +67,7 @@ def complex_feed(shape: str, few: int = len(SILOS)) -> list[Trial]:
 
 
 SCALES = (1.0, 2.0, 4.0, 8.0)
-"""Silo1 made so many times as large: radius 1.25 to 10 m."""
+"""Factors by which silo1 is enlarged: radius 1.25 to 10 m."""
 
 
 @dataclass(frozen=True)

@@ -58,7 +58,7 @@ Index = Annotated[int, BeforeValidator(_index)]
 
 
 def numbers(value: Any, length: int, nullable: bool = False) -> Array:
-    """A list of so many numbers as an array; null is NaN where it may be."""
+    """A list of `length` numbers as an array; null becomes NaN if `nullable`."""
     if not isinstance(value, list):
         raise wrong("must be a list")
     if len(value) != length:

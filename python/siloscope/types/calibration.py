@@ -36,7 +36,7 @@ class FrameRecord:
     weight: float = 0.0
     """With which it was fused, 0 to 1."""
     deviation: float | None = None
-    """Distance of its answer from the fused one: as rare as for a normal variable so many standard deviations off."""
+    """Distance of its answer from the fused one, as the equally rare deviation of a normal variable."""
     pose: SiloPose | None = None
     timestamp: float | None = None
     reason: str | None = None
@@ -96,7 +96,7 @@ class Calibration:
     excess: float = 1.0
     """Scatter of the frames' answers over what they state, as a factor of the variance; at least 1."""
     scale_std: float = 0.0
-    """Standard deviation of the depth scale that nothing could tell; contained in the covariances."""
+    """Standard deviation of the depth scale where nothing determines it; contained in the covariances."""
     moves: tuple[Move, ...] = ()
     """Moves of the camera in the sequence."""
     frames: tuple[FrameRecord, ...] = ()
@@ -175,8 +175,8 @@ class Calibration:
             "parameters": self._parameters(),
             "excess": self.excess,
             "scale_std": self.scale_std,
-            "moved_at": None if self.moved_at is None else self._told(self.moved_at),
-            "moves": [self._told(move) for move in self.moves],
+            "moved_at": None if self.moved_at is None else self._move_to_dict(self.moved_at),
+            "moves": [self._move_to_dict(move) for move in self.moves],
             "quality": list(self.quality),
             "counts": self.counts,
             "frames": [record.to_dict() for record in self.frames],
@@ -192,7 +192,7 @@ class Calibration:
         values = [float(v) if np.isfinite(v) else None for v in self.parameters]
         return {"names": list(PARAMETERS), "values": values, "covariance": self.parameter_covariance.tolist()}
 
-    def _told(self, move: Move) -> dict[str, Any]:
+    def _move_to_dict(self, move: Move) -> dict[str, Any]:
         name = next((record.name for record in self.frames if record.index == move.index), None)
         return {
             "index": move.index,

@@ -46,7 +46,7 @@ class SurfaceDetails:
 
     @cached_property
     def labels(self) -> NDArray[np.uint8] | None:
-        """Label of each pixel (H, W): 0 none, 1 cylinder, 2 cone, 3 feed, 4 other. Worked out when asked for."""
+        """Label of each pixel (H, W): 0 none, 1 cylinder, 2 cone, 3 feed, 4 other. Computed on first access."""
         return None if self._labelled is None else self._labelled()
 
 

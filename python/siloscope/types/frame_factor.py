@@ -62,7 +62,7 @@ class FrameFactor:
 
 @dataclass(frozen=True, eq=False)
 class SummedFactor:
-    """Frames added up about `origin` (12,): what is kept of frames whose own evidence is not.
+    """Factors added up about `origin` (12,): what remains of frames whose own factor is not kept.
 
     `information` is Σ w Λ, `pull` Σ w (Λ (θ - origin) - g), `noise` Σ w² N, `weight` Σ w; and `weight`
     times `shared` is what the frames may share.

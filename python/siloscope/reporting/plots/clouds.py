@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from siloscope.reporting.plots.depth import paint_depth
 from siloscope.reporting.plots.style import BLUE, GREY, INK, RED, figure, heading, legend, tidy
-from siloscope.reporting.plots.view import Points, View, bare, circle, outline, thin
+from siloscope.reporting.plots.view import Points, View, bare, circle, outline, subsample
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry
 
@@ -19,7 +19,7 @@ def clouds(points: Points, corrected: Points, pose: SiloPose, silo: SiloGeometry
 
     `points` is (N, 3) in the camera frame, in metres, `corrected` the same without the sensor's bias: what is adjusted.
     """
-    seen, adjusted = thin(points), pose.to_silo(thin(corrected))
+    seen, adjusted = subsample(points), pose.to_silo(subsample(corrected))
     made = figure(12.0, 6.2)
     overview, front, side = made.subplots(1, 3, width_ratios=(1.25, 1.0, 1.0))
     _overview(overview, seen, adjusted, silo)
@@ -37,7 +37,7 @@ def overview(
     made = figure(12.0, 5.2)
     left, right = made.subplots(1, 2, width_ratios=(1.35, 1.0))
     paint_depth(left, depth)
-    _overview(right, thin(points), pose.to_silo(thin(corrected)), silo)
+    _overview(right, subsample(points), pose.to_silo(subsample(corrected)), silo)
     legend(right, columns=3, gap=0.02)
     return made
 
@@ -48,7 +48,7 @@ def candidates(points: Points, chosen: NDArray[np.bool_], pose: SiloPose, silo: 
     `points` is (N, 3) in the camera frame, `chosen` (N,) tells the candidates.
     """
     adjusted = pose.to_silo(points)
-    rest, picked = thin(adjusted[~chosen]), thin(adjusted[chosen])
+    rest, picked = subsample(adjusted[~chosen]), subsample(adjusted[chosen])
     made = figure(12.0, 6.2)
     overview, plan = made.subplots(1, 2, width_ratios=(1.0, 1.15))
     view = View()

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from siloscope.reporting.plots.style import BLUE, INK, MUTED, RED, figure, heading, tidy
-from siloscope.reporting.plots.view import Points, View, thin
+from siloscope.reporting.plots.view import Points, View, subsample
 
 
 def directions(vectors: Points, direction: Points) -> Figure:
@@ -41,7 +41,7 @@ def _ball(axes: Axes, vectors: Points, direction: Points) -> None:
         turn = np.linspace(0, 2 * np.pi, 97)
         view.line(axes, np.column_stack([r * np.cos(turn), r * np.sin(turn), z + 0 * turn]), color=MUTED, lw=0.5)
     axes.add_patch(Circle((0.0, 0.0), 1.0, fill=False, color=MUTED, linewidth=0.8))
-    view.scatter(axes, thin(vectors, 6000), BLUE, size=2.5)
+    view.scatter(axes, subsample(vectors, 6000), BLUE, size=2.5)
     view.line(axes, np.vstack([-0.0 * direction, 1.25 * direction]), color=RED, linewidth=2.2)
     axes.set_xlim(-1.3, 1.3)
     axes.set_ylim(-1.3, 1.3)

@@ -47,8 +47,8 @@ class View:
         axes.plot(flat[:, 0], flat[:, 1], **style)  # type: ignore[arg-type]
 
 
-def thin(points: Points, most: int = MOST_POINTS, seed: int = 0) -> Points:
-    """At most so many of the finite points, drawn at random with a fixed seed."""
+def subsample(points: Points, most: int = MOST_POINTS, seed: int = 0) -> Points:
+    """At most `most` of the finite points, drawn at random with a fixed seed."""
     kept: Points = points[np.isfinite(points).all(axis=1)]
     if len(kept) > most:
         kept = kept[np.random.default_rng(seed).choice(len(kept), most, replace=False)]

@@ -10,7 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from siloscope.reporting.plots.style import AMBER, BLUE, GREEN, INK, PURPLE, RED, figure, heading, legend, tidy
-from siloscope.reporting.plots.view import thin
+from siloscope.reporting.plots.view import subsample
 from siloscope.reproduction.evaluation.series import Numbers
 from siloscope.simulation import Scene, metrics
 from siloscope.types.pose import SiloPose
@@ -26,7 +26,7 @@ def adjusted(scenes: Mapping[str, Scene], poses: Mapping[str, SiloPose | None], 
     panels = made.subplots(1, len(scenes), squeeze=False)[0]
     for axes, (name, scene) in zip(panels, scenes.items(), strict=True):
         frame = scene.render()
-        points = thin(metrics.camera_points(frame.measured, frame.camera)[frame.measured > 0], 5000)
+        points = subsample(metrics.camera_points(frame.measured, frame.camera)[frame.measured > 0], 5000)
         _side(axes, frame.pose.to_silo(points), BLUE, "true pose")
         pose = poses[name]
         if pose is not None:
@@ -44,7 +44,7 @@ def sensors(clouds: Mapping[str, tuple[Numbers, Numbers]]) -> Figure:
     panels = made.subplots(1, 2)
     for (name, parts), colour in zip(clouds.items(), cycle((BLUE, PURPLE, GREEN, AMBER)), strict=False):
         for axes, points in zip(panels, parts, strict=True):
-            _side(axes, thin(points, 2500), colour, name)
+            _side(axes, subsample(points, 2500), colour, name)
     for axes, title in zip(panels, ("camera frame", "adjusted by shape-tensor"), strict=True):
         _upright(axes, title)
     legend(panels[0])
