@@ -163,8 +163,8 @@ def evidence(frames: Sequence[Seen]) -> str:
     """What is measured on silos, and on what is none, beside the limits in the core."""
     limits = core_limits()
     head = ("", "of points", "of candidates", "around", "along", "miss", "turn", "bend", "answer")
-    least = (f"≥ {limits[name]}" for name in ("LEAST_SHARE", "LEAST_KEPT", "LEAST_AROUND"))
-    most = (f"≤ {limits[name]}" for name in ("MOST_ALONG", "MISS", "TURN", "MOST_BEND"))
+    least = (f"≥ {limits[name]}" for name in ("MIN_FRACTION", "MIN_KEPT_FRACTION", "MIN_AROUND"))
+    most = (f"≤ {limits[name]}" for name in ("MAX_ALONG", "MISS", "TURN", "MAX_BEND"))
     rows: list[tuple[str, ...]] = [("limit", *least, *most, "")]
     answered = [seen for seen in frames if answer(seen) == "ok"]
     measured = np.array([measures(seen) for seen in answered])

@@ -1,4 +1,4 @@
-//! What can go wrong at the core's doors.
+//! Errors of the public API.
 
 /// Result of the core's entry points.
 pub type Result<T> = std::result::Result<T, Error>;

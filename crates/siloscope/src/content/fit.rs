@@ -1,10 +1,12 @@
 //! The surface through the cells: trend, then the detail that the trend is too smooth for.
 
-use super::basis::{Basis, RANGES, Roughness, Row, meeting_point};
+use super::basis::{Basis, Roughness, Row, meeting_point};
 use super::cells::Cell;
 use super::detail;
 use super::grid::Grid;
+use super::roughness::most_probable;
 use super::trend::{Observation, Sums, Trend, variance};
+use crate::stats::robust::{MAD_TO_STD, upper_median};
 
 /// A residual beyond so many robust standard deviations counts less, the more so the farther it is.
 const HUBER: f64 = 2.5;
@@ -12,9 +14,6 @@ const HUBER: f64 = 2.5;
 const ROUNDS: usize = 2;
 /// Roughness of the first, loose fit.
 const LOOSE: Roughness = Roughness { bend: 1.0, rest: 0.1, range: 0 };
-/// Values tried for the roughness, from which the evidence chooses.
-const BENDS: [f64; 5] = [0.03, 0.1, 0.3, 1.0, 3.0];
-const RESTS: [f64; 6] = [0.004, 0.008, 0.016, 0.035, 0.08, 0.16];
 /// Roughness under which two centres are compared, and how much more probable the cells must be about the new one.
 const TRIED: Roughness = Roughness { bend: 0.5, rest: 0.012, range: 0 };
 const GAIN: f64 = 3.0;
@@ -306,54 +305,8 @@ impl<'a> Work<'a> {
     }
 }
 
-/// The trend of the roughness under which the cells are most probable, found by climbing.
-fn most_probable(sums: &Sums, basis: &Basis) -> Option<(Roughness, Trend)> {
-    let mut at = Steps { bend: 2, rest: 0, range: 0 };
-    let mut best = sums.solve(basis, at.roughness())?;
-    let mut tried = vec![at];
-    while let Some(next) = at.around().find(|next| !tried.contains(next)) {
-        tried.push(next);
-        if let Some(trend) = sums.solve(basis, next.roughness()).filter(|t| t.evidence > best.evidence) {
-            (best, at) = (trend, next);
-        }
-    }
-    Some((at.roughness(), best))
-}
-
-/// A place in the lists of values tried for the roughness.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Steps {
-    bend: usize,
-    rest: usize,
-    range: usize,
-}
-
-impl Steps {
-    fn roughness(self) -> Roughness {
-        Roughness { bend: BENDS[self.bend], rest: RESTS[self.rest], range: self.range }
-    }
-
-    /// One step up or down in each list.
-    fn around(self) -> impl Iterator<Item = Self> {
-        let Self { bend, rest, range } = self;
-        let steps = [
-            Self { rest: rest.wrapping_sub(1), ..self },
-            Self { rest: rest + 1, ..self },
-            Self { bend: bend + 1, ..self },
-            Self { bend: bend.wrapping_sub(1), ..self },
-            Self { range: range + 1, ..self },
-            Self { range: range.wrapping_sub(1), ..self },
-        ];
-        steps.into_iter().filter(|s| s.bend < BENDS.len() && s.rest < RESTS.len() && s.range < RANGES.len())
-    }
-}
-
 /// Robust standard deviation about zero.
 fn scatter(residuals: &[f64]) -> f64 {
-    let mut size: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
-    let middle = size.len() / 2;
-    if size.is_empty() {
-        return 0.0;
-    }
-    1.4826 * *size.select_nth_unstable_by(middle, f64::total_cmp).1
+    let mut sizes: Vec<f64> = residuals.iter().map(|r| r.abs()).collect();
+    MAD_TO_STD * upper_median(&mut sizes).unwrap_or(0.0)
 }

@@ -10,6 +10,7 @@ pub mod detail;
 pub mod fit;
 pub mod grid;
 pub mod jacobian;
+pub mod roughness;
 pub mod setup;
 pub mod shape;
 pub mod silo_points;

@@ -10,16 +10,16 @@ use crate::stats::blocks::sums;
 use crate::{SiloPose, Vec3};
 use nalgebra::{Matrix2, Matrix4, Matrix4x2, Vector2};
 
-/// Fewest blocks that tell a scatter.
-const LEAST_BLOCKS: usize = 6;
+/// Fewest blocks from which a scatter is estimated.
+const MIN_BLOCKS: usize = 6;
 /// Largest standard deviation of the direction that still is an answer, radians.
-const MOST_TILT: f64 = 0.05;
+const MAX_TILT_STD: f64 = 0.05;
 
-/// One estimate of so many is looked at: they are many, and the blocks behind them few. Prime, so that with the usual
-/// numbers of partners a plane's turn never falls on the same partners.
-const SOME: usize = 7;
-/// How near the limit is at the limit, as a share of it.
-const EDGE: f64 = 0.25;
+/// Stride over the estimated axis points: they are many, and the blocks behind them few. Prime, so that it shares no
+/// factor with the usual numbers of partners.
+const STRIDE: usize = 7;
+/// Half-width of the window around the inlier limit, as a fraction of the limit.
+const LIMIT_WINDOW: f64 = 0.25;
 
 /// What the covariance is drawn from.
 pub struct Scatter<'a> {
@@ -46,7 +46,7 @@ impl Scatter<'_> {
     pub fn covariance(&self) -> Result<Matrix4<f64>, Refusal> {
         let covariance = self.sandwiches();
         let std = covariance.diagonal().map(f64::sqrt);
-        let determined = self.blocks >= LEAST_BLOCKS && std.x < MOST_TILT && std.y < MOST_TILT;
+        let determined = self.blocks >= MIN_BLOCKS && std.x < MAX_TILT_STD && std.y < MAX_TILT_STD;
         if determined { Ok(covariance) } else { Err(Refusal::PoorlyDetermined) }
     }
 
@@ -70,14 +70,14 @@ impl Scatter<'_> {
     /// What leaving candidates out costs: those that enter and leave at the limit as X turns weaken its hold by the
     /// limit times their density there. Where they are as dense as anywhere else, any direction would hold itself.
     fn hold_lost(&self) -> Matrix2<f64> {
-        let near = |e: &&Vec3| (e.z.abs() - self.limit).abs() < EDGE * self.limit;
+        let near = |e: &&Vec3| (e.z.abs() - self.limit).abs() < LIMIT_WINDOW * self.limit;
         let at_limit: Matrix2<f64> = self.candidates.iter().filter(near).map(|e| e.xy() * e.xy().transpose()).sum();
-        at_limit / (2.0 * EDGE)
+        at_limit / (2.0 * LIMIT_WINDOW)
     }
 
     /// Each coordinate solves Σ sign(x_i − median) = 0, whose slope is the density of the estimates at the median.
     fn of_point(&self) -> Matrix2<f64> {
-        let some: Vec<&AxisPoint> = self.estimates.iter().step_by(SOME).collect();
+        let some: Vec<&AxisPoint> = self.estimates.iter().step_by(STRIDE).collect();
         let columns = [0, 1].map(|k| some.iter().map(|e| e.at[k]).collect::<Vec<_>>());
         let centre = columns.clone().map(|column| quantiles(column, [0.35, 0.5, 0.65]));
         let n = some.len() as f64;

@@ -67,21 +67,21 @@ pub fn placed_walls(kept: &[Candidate], points: &[Vec3], normals: &[Vec3], pose:
 }
 
 /// Fewest walls that are evidence of anything.
-const LEAST_WALLS: usize = 30;
+const MIN_WALLS: usize = 30;
 /// Least share of the walls among the candidates, and among all points.
-const LEAST_KEPT: f64 = 0.25;
-const LEAST_SHARE: f64 = 0.05;
+const MIN_KEPT_FRACTION: f64 = 0.25;
+const MIN_FRACTION: f64 = 0.05;
 /// Least spread of E1 about the axis: walls over an arc of some 30°.
-const LEAST_AROUND: f64 = 0.06;
+const MIN_AROUND: f64 = 0.06;
 /// Range of `miss`.
 const MISS: std::ops::Range<f64> = 0.0..0.06;
 /// Range of |`turn`|.
 const TURN: std::ops::Range<f64> = 0.8..1.25;
 /// Largest `along` and |`bend`|.
-const MOST_ALONG: f64 = 0.12;
-const MOST_BEND: f64 = 0.06;
+const MAX_ALONG: f64 = 0.12;
+const MAX_BEND: f64 = 0.06;
 /// Largest share of pixels behind the wall.
-const MOST_BEHIND: f64 = 0.02;
+const MAX_BEHIND: f64 = 0.02;
 
 impl Evidence {
     /// Measures it; `counts` are those of points and candidates, `spread` is that of step 4.
@@ -109,14 +109,14 @@ impl Evidence {
     /// The limits lie between what simulated silos and what walls, corners, shafts, spheres and heaps of feed give:
     /// docs/design/choices-shape-tensor.md.
     pub fn judge(&self, view: View) -> Result<(), Refusal> {
-        let (walls, kept) = (self.walls as f64, LEAST_KEPT * self.candidates as f64);
-        let few = self.walls < LEAST_WALLS || walls < kept || walls < LEAST_SHARE * self.points as f64;
-        let bent = !(self.along < MOST_ALONG && self.bend.abs() < MOST_BEND);
+        let (walls, kept) = (self.walls as f64, MIN_KEPT_FRACTION * self.candidates as f64);
+        let few = self.walls < MIN_WALLS || walls < kept || walls < MIN_FRACTION * self.points as f64;
+        let bent = !(self.along < MAX_ALONG && self.bend.abs() < MAX_BEND);
         match () {
             () if few || !MISS.contains(&self.miss) => Err(Refusal::NoWall),
             () if bent => Err(Refusal::Bent),
-            () if !(self.around > LEAST_AROUND && TURN.contains(&self.turn.abs())) => Err(Refusal::Flat),
-            () if view == View::Inside && self.behind > MOST_BEHIND => Err(Refusal::BehindWall),
+            () if !(self.around > MIN_AROUND && TURN.contains(&self.turn.abs())) => Err(Refusal::Flat),
+            () if view == View::Inside && self.behind > MAX_BEHIND => Err(Refusal::BehindWall),
             () => Ok(()),
         }
     }

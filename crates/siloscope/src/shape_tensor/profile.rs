@@ -43,13 +43,13 @@ const PLACES: usize = 4000;
 const PROPOSERS: usize = 48;
 const JUDGES: usize = 160;
 /// How far a wall's normal may be off its part's, radians: far walls are rough.
-const ANGLE: f64 = 0.25;
+const MAX_ANGLE: f64 = 0.25;
 /// How far a wall may be off a proposed part, as a share of the median distance from the axis.
-const REACH: f64 = 0.04;
+const PROPOSAL_TOLERANCE: f64 = 0.04;
 /// Slopes m of cones that hold feed and let it out.
 const SLOPES: std::ops::RangeInclusive<f64> = 0.1..=5.0;
 /// Share of the places that a part must have to be one.
-const LEAST: f64 = 0.02;
+const MIN_FRACTION: f64 = 0.02;
 
 /// Fits cylinder and cone to a cloud with its normals, given the pose; blocks of side `side` tell how sure they are.
 ///
@@ -57,10 +57,10 @@ const LEAST: f64 = 0.02;
 /// refined by least squares with Tukey's weights. Feed may be among the points: it is outvoted, or no wall.
 pub fn fit_profile(points: &[Vec3], normals: &[Vec3], pose: &SiloPose, side: f64) -> Profile {
     let (places, blocks) = places(points, normals, pose, side);
-    let judges = thinned(&places, JUDGES);
+    let judges = subsample(&places, JUDGES);
     let Some(scale) = median(judges.iter().map(|p| p.rho).collect()) else { return Profile::default() };
-    let mut profile = proposed(&judges, REACH * scale);
-    profile.misfit = REACH * scale;
+    let mut profile = proposed(&judges, PROPOSAL_TOLERANCE * scale);
+    profile.misfit = PROPOSAL_TOLERANCE * scale;
     for _ in 0..10 {
         profile.refine(&places);
     }
@@ -74,7 +74,7 @@ fn places(points: &[Vec3], normals: &[Vec3], pose: &SiloPose, side: f64) -> (Vec
     let turn = pose.rotation();
     let step = points.len().div_ceil(PLACES).max(1);
     let placed = points.iter().zip(normals).step_by(step).map(|(p, normal)| (pose.to_silo(p), turn * normal));
-    let meets_axis = |(p, n): &(Vec3, Vec3)| (p.x * n.y - p.y * n.x).abs() < ANGLE * p.xy().norm() * n.xy().norm();
+    let meets_axis = |(p, n): &(Vec3, Vec3)| (p.x * n.y - p.y * n.x).abs() < MAX_ANGLE * p.xy().norm() * n.xy().norm();
     let placed: Vec<_> = placed.filter(meets_axis).collect();
     let (block, blocks) = blocks(placed.iter().map(|(p, _)| *p), side);
     let place = |((p, n), block): (&(Vec3, Vec3), usize)| {
@@ -84,15 +84,15 @@ fn places(points: &[Vec3], normals: &[Vec3], pose: &SiloPose, side: f64) -> (Vec
     (placed.iter().zip(block).map(place).collect(), blocks)
 }
 
-fn thinned(places: &[Place], n: usize) -> Vec<Place> {
+fn subsample(places: &[Place], n: usize) -> Vec<Place> {
     let n = n.min(places.len());
     (0..n).map(|i| places[i * places.len() / n]).collect()
 }
 
 /// The proposal that most judges agree with: one part first, then the other where it is wanted.
 fn proposed(judges: &[Place], reach: f64) -> Profile {
-    let proposers = thinned(judges, PROPOSERS);
-    let cylinders = proposers.iter().filter(|p| p.angle.abs() < ANGLE).map(|p| Some(p.rho));
+    let proposers = subsample(judges, PROPOSERS);
+    let cylinders = proposers.iter().filter(|p| p.angle.abs() < MAX_ANGLE).map(|p| Some(p.rho));
     let cylinders: Vec<_> = cylinders.chain([None]).collect();
     let pairs = proposers.iter().enumerate().flat_map(|(i, p)| proposers[..i].iter().map(move |q| (p, q)));
     let cones: Vec<_> = pairs.filter_map(|(p, q)| cone_through(p, q)).map(Some).chain([None]).collect();
@@ -107,7 +107,7 @@ fn proposed(judges: &[Place], reach: f64) -> Profile {
         None => cylinders.iter().map(|r| judged(*r, one.cone)).collect(),
     };
     let (with_other, both) = best(other.into_iter());
-    if with_other > score + LEAST * judges.len() as f64 { both } else { one }
+    if with_other > score + MIN_FRACTION * judges.len() as f64 { both } else { one }
 }
 
 fn best(judged: impl Iterator<Item = (f64, Profile)>) -> (f64, Profile) {
@@ -116,7 +116,7 @@ fn best(judged: impl Iterator<Item = (f64, Profile)>) -> (f64, Profile) {
 
 fn cone_through(p: &Place, q: &Place) -> Option<Cone> {
     let slope = (p.rho - q.rho) / (q.z - p.z);
-    let fits = |place: &Place| (slope.atan() - place.angle).abs() < ANGLE;
+    let fits = |place: &Place| (slope.atan() - place.angle).abs() < MAX_ANGLE;
     let is_cone = SLOPES.contains(&slope) && fits(p) && fits(q);
     is_cone.then(|| Cone { slope, apex: p.z + p.rho / slope })
 }
@@ -185,7 +185,7 @@ impl Profile {
     fn agreement(&self, p: &Place, reach: f64) -> f64 {
         let (off, angle) = self.distance(p.rho, p.z);
         let soft = |x: f64| (1.0 - x * x).max(0.0);
-        if off.is_nan() { 0.0 } else { soft(off / reach) * soft((p.angle - angle) / (2.0 * ANGLE)) }
+        if off.is_nan() { 0.0 } else { soft(off / reach) * soft((p.angle - angle) / (2.0 * MAX_ANGLE)) }
     }
 
     /// One round of reweighted least squares on each part; the scale is the agreeing places' own.
@@ -213,14 +213,14 @@ impl Profile {
     fn weight(&self, p: &Place) -> f64 {
         let (off, angle) = self.distance(p.rho, p.z);
         let x = off / (TUKEY * self.misfit.max(1e-12));
-        let agrees = (p.angle - angle).abs() < 2.0 * ANGLE && x.abs() < 1.0;
+        let agrees = (p.angle - angle).abs() < 2.0 * MAX_ANGLE && x.abs() < 1.0;
         if agrees { (1.0 - x * x).powi(2) } else { 0.0 }
     }
 
     fn drop_small_parts(&mut self, places: &[Place]) {
         let weight = |cone: bool| self.of_part(places, cone).iter().map(|(_, w)| w).sum::<f64>();
         let (cylinder, cone) = (weight(false), weight(true));
-        let least = LEAST * (cylinder + cone);
+        let least = MIN_FRACTION * (cylinder + cone);
         self.radius = self.radius.filter(|_| cylinder > least);
         self.cone = self.cone.filter(|_| cone > least);
     }

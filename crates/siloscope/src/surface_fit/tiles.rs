@@ -6,7 +6,9 @@
 use crate::Vec3;
 use crate::geometry::depth_image::DepthImage;
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
-use crate::stats::robust::{MAD_TO_STD, MEDIAN_OF_CHI_SQUARE, median, upper_median};
+use crate::stats::robust::{MEDIAN_OF_CHI_SQUARE, median};
+pub use crate::surface_fit::tile_plane::MAX_SIDE;
+use crate::surface_fit::tile_plane::{Plane, Tile, robust_tile, tiles};
 
 /// A small piece of surface.
 #[derive(Debug, Clone, Copy)]
@@ -79,126 +81,11 @@ pub struct Patches {
     pub cloud: bool,
 }
 
-/// Sums of a plane fit z = a + b·u + c·v over pixels, u and v relative to the tile's centre.
-#[derive(Debug, Clone, Copy, Default)]
-struct Sums {
-    n: f64,
-    u: f64,
-    v: f64,
-    uu: f64,
-    uv: f64,
-    vv: f64,
-    z: f64,
-    uz: f64,
-    vz: f64,
-    zz: f64,
-}
-
-/// Pixels of a row that are added together.
-const LANES: usize = 4;
-
-#[derive(Debug, Clone, Copy, Default)]
-struct Plane {
-    a: f64,
-    b: f64,
-    c: f64,
-}
-
-impl Sums {
-    #[inline]
-    fn add(&mut self, u: f64, v: f64, z: f64) {
-        self.n += 1.0;
-        self.u += u;
-        self.v += v;
-        self.uu += u * u;
-        self.uv += u * v;
-        self.vv += v * v;
-        self.z += z;
-        self.uz += u * z;
-        self.vz += v * z;
-        self.zz += z * z;
-    }
-
-    /// Adds a row of pixels at v, whose u are counted from `centre`.
-    #[inline]
-    fn add_row(&mut self, v: f64, centre: f64, depths: &[f32]) {
-        let is_there = |z: f32| (z > 0.0) & (z < f32::INFINITY);
-        if !depths.iter().fold(true, |all, &z| all & is_there(z)) {
-            for (u, &z) in depths.iter().enumerate().filter(|(_, z)| is_there(**z)) {
-                self.add(u as f64 - centre, v, f64::from(z));
-            }
-            return;
-        }
-        let (mut z, mut uz, mut zz) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-        let (whole, rest) = depths.as_chunks::<LANES>();
-        for (four, depths) in whole.iter().enumerate() {
-            for lane in 0..LANES {
-                let depth = f64::from(depths[lane]);
-                z[lane] += depth;
-                uz[lane] += ((four * LANES + lane) as f64 - centre) * depth;
-                zz[lane] += depth * depth;
-            }
-        }
-        for (lane, &depth) in rest.iter().enumerate() {
-            let depth = f64::from(depth);
-            z[lane] += depth;
-            uz[lane] += ((whole.len() * LANES + lane) as f64 - centre) * depth;
-            zz[lane] += depth * depth;
-        }
-        let n = depths.len() as f64;
-        let of_row: f64 = z.iter().sum();
-        self.n += n;
-        self.uu += n * (n * n - 1.0) / 12.0;
-        self.v += n * v;
-        self.vv += n * v * v;
-        self.z += of_row;
-        self.uz += uz.iter().sum::<f64>();
-        self.vz += v * of_row;
-        self.zz += zz.iter().sum::<f64>();
-    }
-
-    /// Adds a neighbour's sums, whose centre lies at (du, dv) from ours.
-    fn add_shifted(&mut self, o: &Sums, du: f64, dv: f64) {
-        self.n += o.n;
-        self.u += o.u + du * o.n;
-        self.v += o.v + dv * o.n;
-        self.uu += o.uu + 2.0 * du * o.u + du * du * o.n;
-        self.uv += o.uv + du * o.v + dv * o.u + du * dv * o.n;
-        self.vv += o.vv + 2.0 * dv * o.v + dv * dv * o.n;
-        self.z += o.z;
-        self.uz += o.uz + du * o.z;
-        self.vz += o.vz + dv * o.z;
-        self.zz += o.zz;
-    }
-
-    /// Least-squares plane; `None` for pixels on a line or a point.
-    fn plane(&self) -> Option<Plane> {
-        let (mu, mv, mz) = (self.u / self.n, self.v / self.n, self.z / self.n);
-        let (uu, uv, vv) = (self.uu - mu * self.u, self.uv - mu * self.v, self.vv - mv * self.v);
-        let (uz, vz) = (self.uz - mu * self.z, self.vz - mv * self.z);
-        let det = uu * vv - uv * uv;
-        if !(det > 0.05 * uu * vv && det > 1e-9) {
-            return None;
-        }
-        let (b, c) = ((uz * vv - vz * uv) / det, (vz * uu - uz * uv) / det);
-        Some(Plane { a: mz - b * mu - c * mv, b, c })
-    }
-
-    /// Root-mean-square distance of the pixels from a plane that was fitted to them.
-    fn scatter(&self, p: &Plane) -> f64 {
-        let residual = self.zz - p.a * self.z - p.b * self.uz - p.c * self.vz;
-        (residual.max(0.0) / (self.n - 3.0).max(1.0)).sqrt()
-    }
-}
-
 /// Side of the tiles: about 80 of them across the image, or as few as 40 where they would be narrower than 8 pixels.
 pub fn tile_side(width: usize) -> usize {
     let across = |tiles: f64| (width as f64 / tiles).round() as usize;
     across(80.0).max(across(40.0).min(8)).clamp(4, MAX_SIDE)
 }
-
-/// Largest side of a tile, pixels.
-pub const MAX_SIDE: usize = 16;
 
 /// Cuts a depth image into tiles. `noise` is the expected noise where it is known.
 pub fn tile_patches(image: &DepthImage, noise: Option<&NoiseLaw>) -> Patches {
@@ -259,96 +146,6 @@ fn third_difference(four: &[Option<Tile>], law: &NoiseLaw, relief: f64) -> Optio
     let variance = |t: &Tile| law.sigma(t.depth()).powi(2) / t.sums.n + relief * relief;
     let expected = variance(a) + 9.0 * (variance(b) + variance(c)) + variance(d);
     Some(bend * bend / (MEDIAN_OF_CHI_SQUARE * expected))
-}
-
-/// A tile's sums, its plane, and the pixels' scatter about it.
-#[derive(Debug, Clone, Copy)]
-struct Tile {
-    sums: Sums,
-    plane: Plane,
-    scatter: f64,
-}
-
-impl Tile {
-    fn of(sums: Sums) -> Option<Self> {
-        let plane = sums.plane()?;
-        Some(Self { sums, plane, scatter: sums.scatter(&plane) })
-    }
-
-    fn depth(&self) -> f64 {
-        self.sums.z / self.sums.n
-    }
-}
-
-/// The tiles of the image, row by row; `None` where too little was measured.
-fn tiles(image: &DepthImage, side: usize, (columns, rows): (usize, usize)) -> Vec<Option<Tile>> {
-    let enough = 0.3 * (side * side) as f64;
-    let centre = (side as f64 - 1.0) / 2.0;
-    let mut tiles = Vec::with_capacity(columns * rows);
-    let mut band = vec![Sums::default(); columns];
-    for row in 0..rows {
-        band.fill(Sums::default());
-        for v in 0..side {
-            // along the image's rows, as they lie in memory
-            let depths = &image.depth[(row * side + v) * image.width..][..columns * side];
-            for (sums, depths) in band.iter_mut().zip(depths.chunks_exact(side)) {
-                sums.add_row(v as f64 - centre, centre, depths);
-            }
-        }
-        tiles.extend(band.iter().map(|sums| if sums.n < enough { None } else { Tile::of(*sums) }));
-    }
-    tiles
-}
-
-/// Plane through the tile's majority: a start from the medians of its quadrants, then inliers only.
-fn robust_tile(image: &DepthImage, (u0, v0): (usize, usize), side: usize) -> Option<Tile> {
-    let centre = (side as f64 - 1.0) / 2.0;
-    let mut pixels = [(0.0f64, 0.0f64, 0.0f64); MAX_SIDE * MAX_SIDE];
-    let mut n = 0;
-    for v in 0..side {
-        for u in 0..side {
-            let z = image.depth[(v0 + v) * image.width + u0 + u];
-            if z > 0.0 && z < f32::INFINITY {
-                pixels[n] = (u as f64 - centre, v as f64 - centre, f64::from(z));
-                n += 1;
-            }
-        }
-    }
-    let pixels = &pixels[..n];
-    let mut plane = quadrant_plane(pixels)?;
-    let mut kept = None;
-    for _ in 0..3 {
-        let mut residuals: Vec<f64> =
-            pixels.iter().map(|p| (p.2 - plane.a - plane.b * p.0 - plane.c * p.1).abs()).collect();
-        let limit = (3.0 * MAD_TO_STD * upper_median(&mut residuals)?).max(1e-4);
-        let mut sums = Sums::default();
-        for p in pixels {
-            if (p.2 - plane.a - plane.b * p.0 - plane.c * p.1).abs() <= limit {
-                sums.add(p.0, p.1, p.2);
-            }
-        }
-        if sums.n < 0.55 * n as f64 {
-            return None;
-        }
-        let tile = Tile::of(sums)?;
-        plane = tile.plane;
-        kept = Some(tile);
-    }
-    kept
-}
-
-fn quadrant_plane(pixels: &[(f64, f64, f64)]) -> Option<Plane> {
-    let mut sums = Sums::default();
-    for quadrant in 0..4 {
-        let inside = |p: &&(f64, f64, f64)| usize::from(p.0 > 0.0) + 2 * usize::from(p.1 > 0.0) == quadrant;
-        let mut z: Vec<f64> = pixels.iter().filter(inside).map(|p| p.2).collect();
-        let Some(median) = upper_median(&mut z) else { continue };
-        let n = z.len() as f64;
-        let u = pixels.iter().filter(inside).map(|p| p.0).sum::<f64>() / n;
-        let v = pixels.iter().filter(inside).map(|p| p.1).sum::<f64>() / n;
-        sums.add(u, v, median);
-    }
-    if sums.n < 3.0 { None } else { sums.plane() }
 }
 
 /// The patch of one tile; its normal comes from the tile and those neighbours that continue its plane.
