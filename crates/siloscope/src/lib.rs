@@ -3,6 +3,11 @@
 //! Everything here is pure computation: no files, no printing, no global thread pool. Lengths are metres and
 //! angles radians. The camera frame is optical (x right, y down, z forward); the silo frame has its origin on the
 //! axis at the camera's height and z along gravity.
+//!
+//! Three questions, one method each: where is the axis ([`shape_tensor`], the paper's six steps)? What is the wall, and
+//! how well is it known ([`surface_fit`])? What is in the vessel ([`content`])? The methods stand side by side on
+//! [`geometry`] (pose, camera, wall, vessel), [`stats`] (numerics) and [`base`] (errors, threads); [`fusion`] holds what
+//! a frame leaves behind for the fusion of many.
 
 pub mod base;
 pub mod content;
