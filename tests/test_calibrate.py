@@ -15,6 +15,7 @@ import pytest
 
 from siloscope import Calibration, Estimate, InputError, SiloPose, UsageError, _core, calibrate, locate, sensors
 from siloscope.cli import main
+from siloscope.estimation.priors import Priors
 from siloscope.estimation.surface import fit_depth
 from siloscope.fusion.factors import LENGTHS, SCALE, FrameFactors
 from siloscope.fusion.relinearize import relinearized
@@ -30,7 +31,7 @@ SILO3 = replace(scenario("silo3"), sensor=ASTRA_S)
 @functools.cache
 def located(scene: Scene, sensor: str | None = "orbbec-astra-s", diameter: float | None = None) -> Estimate:
     depth = np.nan_to_num(scene.render().measured).astype(np.float32)
-    return fit_depth(depth, scene.camera, sensors.load(sensor), diameter=diameter)
+    return fit_depth(depth, scene.camera, Priors(sensors.load(sensor), diameter))
 
 
 @functools.cache
@@ -170,22 +171,22 @@ def test_the_view_from_elsewhere_takes_any_layout_and_refuses_arrays_that_do_not
         factors.free,
         factors.linearization_point + near,
     )
-    steps, turns = _core.surface_seen_from(*given)
-    np.testing.assert_allclose(steps, near, rtol=1e-2, atol=1e-9)
+    carried = _core.map_increment(*given)
+    np.testing.assert_allclose(carried.step, near, rtol=1e-2, atol=1e-9)
     layouts: list[Callable[[Any], Any]] = [np.asfortranarray, lambda a: np.repeat(a, 2, axis=0)[::2]]
     for layout in layouts:
-        again = _core.surface_seen_from(*(layout(array) for array in given))
-        np.testing.assert_array_equal(again[0], steps)
-        np.testing.assert_array_equal(again[1], turns)
-    assert _core.surface_seen_from(*(array[:0] for array in given))[1].shape == (0, 12, 12)
-    nowhere = _core.surface_seen_from(
+        again = _core.map_increment(*(layout(array) for array in given))
+        np.testing.assert_array_equal(again.step, carried.step)
+        np.testing.assert_array_equal(again.jacobian, carried.jacobian)
+    assert _core.map_increment(*(array[:0] for array in given)).jacobian.shape == (0, 12, 12)
+    nowhere = _core.map_increment(
         factors.linearization_point, factors.rays, factors.free, np.full_like(factors.linearization_point, np.nan)
     )
-    assert np.isfinite(nowhere[0]).all()
+    assert np.isfinite(nowhere.step).all()
     for k in range(4):
         wrong = [array[1:] if number == k else array for number, array in enumerate(given)]
         with pytest.raises(ValueError, match="shapes"):
-            _core.surface_seen_from(*wrong)
+            _core.map_increment(*wrong)
 
 
 @pytest.mark.parametrize("diameter", [None, 3.0])

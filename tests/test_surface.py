@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from siloscope import Estimate, SiloPose, sensors
+from siloscope.estimation.priors import Priors
 from siloscope.estimation.surface import fit_depth
 from siloscope.reasons import estimate_refusals
 from siloscope.sensors import SensorProfile
@@ -27,9 +28,9 @@ NAMES = ("silo1", "silo2", "silo3")
 POSE = ("r_x", "r_y", "t_x", "t_y")
 
 
-def fit(scene: Scene, sensor: str | None, **known: Any) -> Estimate:
+def fit(scene: Scene, sensor: str | None, start: Estimate | None = None, **known: Any) -> Estimate:
     depth = np.nan_to_num(scene.render().measured).astype(np.float32)
-    return fit_depth(depth, scene.camera, sensors.load(sensor), **known)
+    return fit_depth(depth, scene.camera, Priors(sensors.load(sensor), **known), start=start)
 
 
 def gap(estimate: Estimate, scene: Scene) -> float:
@@ -74,7 +75,7 @@ def test_a_distorted_lens_costs_no_accuracy(name: str, model: str) -> None:
     scene = scenario(name)
     bent = replace(scene, camera=replace(scene.camera, distortion_model=model, distortion=LENSES[model]))
     depth = np.nan_to_num(bent.render().depth).astype(np.float32)
-    found = fit_depth(depth, bent.camera, SensorProfile("exact", noise=(5e-4, 0, 0, 0, 0, 1)))
+    found = fit_depth(depth, bent.camera, Priors(SensorProfile("exact", noise=(5e-4, 0, 0, 0, 0, 1))))
     assert gap(found, bent) < 1e-3  # with straight lines between a tile's corners: up to 1e-2
 
 
@@ -200,8 +201,8 @@ def test_a_gravity_prior_pulls_the_axis_by_its_weight() -> None:
     scene = replace(scenario("silo1"), sensor=ASTRA_S)
     depth = np.nan_to_num(scene.render().measured).astype(np.float32)
     tilted = SiloPose(scene.pose.r_x + 0.01, scene.pose.r_y, 0, 0).axis_direction
-    free = fit_depth(depth, scene.camera, sensors.load("orbbec-astra-s"))
-    held = fit_depth(depth, scene.camera, sensors.load("orbbec-astra-s"), gravity=tilted, gravity_std=1e-7)
+    free = fit_depth(depth, scene.camera, Priors(sensors.load("orbbec-astra-s")))
+    held = fit_depth(depth, scene.camera, Priors(sensors.load("orbbec-astra-s"), gravity=tilted, gravity_std=1e-7))
     assert free.pose is not None
     assert held.pose is not None
     assert abs(free.pose.r_x - scene.pose.r_x) < 1e-4

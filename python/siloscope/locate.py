@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike, NDArray
 from siloscope import sensors
 from siloscope.errors import UsageError
 from siloscope.estimation import shape_tensor, surface
-from siloscope.estimation.inputs import Prepared, prepare
+from siloscope.estimation.inputs import Prepared, PreparedDepth, PreparedPoints, prepare
+from siloscope.estimation.priors import CLOUD, Priors
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import Camera, is_number
 from siloscope.types.estimate import Estimate
@@ -120,23 +121,20 @@ def locate(
     return run(prepared, settings, _config(method, prepared, settings))
 
 
-def _surface(prepared: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:
-    known: dict[str, Any] = {"diameter": settings.diameter, "gravity": settings.gravity, "config": config}
-    if prepared.points is not None:
-        return surface.fit_points(prepared.points, grid=settings.grid, threads=settings.threads, **known)
-    assert prepared.depth is not None
-    assert prepared.camera is not None
-    known |= {"start": settings.start, "ratios": settings.ratios}
-    return surface.fit_depth(prepared.depth, prepared.camera, settings.profile, **known)
+def _surface(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:
+    profile = CLOUD if isinstance(frame, PreparedPoints) else settings.profile
+    priors = Priors(profile, settings.diameter, settings.gravity)
+    if isinstance(frame, PreparedPoints):
+        return surface.fit_points(frame.points, priors, grid=settings.grid, threads=settings.threads, config=config)
+    start, ratios = settings.start, settings.ratios
+    return surface.fit_depth(frame.depth, frame.camera, priors, start=start, ratios=ratios, config=config)
 
 
-def _shape_tensor(prepared: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:
+def _shape_tensor(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:
     chosen = shape_tensor.Settings(grid=settings.grid, neighbours=settings.neighbours, threads=settings.threads)
-    if prepared.points is not None:
-        return shape_tensor.fit_points(prepared.points, chosen, config)
-    assert prepared.depth is not None
-    assert prepared.camera is not None
-    return shape_tensor.fit_depth(prepared.depth, prepared.camera, chosen, config)
+    if isinstance(frame, PreparedPoints):
+        return shape_tensor.fit_points(frame.points, chosen, config)
+    return shape_tensor.fit_depth(frame.depth, frame.camera, chosen, config)
 
 
 METHODS: dict[str, Callable[[Prepared, Settings, dict[str, Any]], Estimate]] = {
@@ -156,7 +154,7 @@ def _config(method: str, prepared: Prepared, settings: Settings) -> dict[str, An
         "grid": settings.grid,
         "neighbours": settings.neighbours,
         "threads": settings.threads,
-        "camera": None if prepared.camera is None else prepared.camera.to_dict(),
+        "camera": prepared.camera.to_dict() if isinstance(prepared, PreparedDepth) else None,
         **prepared.config,
     }
 

@@ -18,12 +18,13 @@ from siloscope.content.density import Density, choose
 from siloscope.content.knowledge import WALL_STD, Knowledge, know, narrowed
 from siloscope.content.reading import Request, content_of, lengths_for_core, source_of
 from siloscope.errors import InputError, UsageError
-from siloscope.estimation.inputs import Prepared, prepare
+from siloscope.estimation.inputs import Prepared, PreparedPoints, prepare
 from siloscope.locate import locate
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
 from siloscope.types.camera import Camera
 from siloscope.types.content import Content
+from siloscope.types.depth_frame import DepthFrame
 from siloscope.types.frame import Frame
 
 BEHIND = 1.5
@@ -155,19 +156,18 @@ def _camera(data: Frame | ArrayLike, camera: Camera | None, calibration: Calibra
 
 def _inputs(
     prepared: Prepared, known: Knowledge, sheet: Datasheet
-) -> tuple[NDArray[np.float32], Camera | None, NDArray[np.float64] | None, _core.ContentSetup]:
+) -> tuple[DepthFrame | NDArray[np.float32], _core.ContentSetup]:
     """What the core takes."""
-    depth = prepared.depth
-    if depth is None and prepared.points is not None:
-        depth = np.ascontiguousarray(prepared.points, np.float32)
-    assert depth is not None
-    camera = prepared.camera
-    rays = None if camera is None or camera.distortion_model == "none" else camera.rays()
+    data = (
+        np.asarray(prepared.points, np.float32)
+        if isinstance(prepared, PreparedPoints)
+        else DepthFrame.of(prepared.depth, prepared.camera)
+    )
     setup = _core.ContentSetup(
         (known.pose.r_x, known.pose.r_y, known.pose.t_x, known.pose.t_y), lengths_for_core(known, sheet),
         known.covariance, WALL_STD, known.bias, known.noise, known.noise_known, known.range,
     )  # fmt: skip
-    return depth, camera, rays, setup
+    return data, setup
 
 
 def _run(prepared: Prepared, known: Knowledge, sheet: Datasheet) -> tuple[dict[str, Any], _core.ContentSurface | None]:
@@ -193,9 +193,8 @@ def _closer(prepared: Prepared, known: Knowledge, sheet: Datasheet, calibration:
 
 def _every_other(prepared: Prepared) -> Prepared:
     """Every other row and column of a depth image: enough to see how far the bare wall reaches."""
-    depth, camera = prepared.depth, prepared.camera
-    if depth is None or camera is None:
+    if isinstance(prepared, PreparedPoints):
         return prepared
-    few = np.ascontiguousarray(depth[::2, ::2])
+    few, camera = prepared.depth[::2, ::2], prepared.camera
     (height, width), halves = few.shape, {name: getattr(camera, name) / 2 for name in ("fx", "fy", "cx", "cy")}
     return replace(prepared, depth=few, camera=replace(camera, width=width, height=height, **halves))

@@ -99,7 +99,7 @@ CONTENT_REFUSALS = ("too-little-seen", "sensor-buried", "camera-moved", "below-t
 
 def estimate_refusals() -> dict[str, tuple[str, str]]:
     """Every reason for a refusal: what it means, and what to try."""
-    return {slug: (meaning, advice) for slug, meaning, advice in _core.surface_refusals()}
+    return {refusal.slug: (refusal.meaning, refusal.remedy) for refusal in _core.refusals()}
 
 
 def sentence(reason: tuple[str, str], detail: str = "") -> str:

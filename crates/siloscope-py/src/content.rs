@@ -1,9 +1,9 @@
 //! Content: surface map and volume.
 
-use crate::convert::{self, value_error};
-use numpy::{
-    PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyReadonlyArray3, PyReadonlyArrayDyn, PyUntypedArrayMethods,
-};
+use crate::arrays;
+use crate::convert::value_error;
+use crate::inputs::{DepthFrame, depth_bias, noise_law};
+use numpy::{PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use siloscope::content::cells::Cell;
@@ -15,18 +15,12 @@ use siloscope::content::shape::{Form, Shape};
 use siloscope::content::silo_points::Source;
 use siloscope::content::volume::Kind;
 use siloscope::content::{Content, Setup, bare_reach, measure, shape_of};
-use siloscope::geometry::depth_image::DepthImage;
-use siloscope::geometry::sensor::{DepthBias, NoiseLaw};
 use siloscope::geometry::vessel::Vessel;
 use siloscope::{SiloPose, Vec3};
 
 /// A silo as Python gives it: radius, cylinder_bottom, apex, top, outlet radius and length, ovality c and s.
 fn vessel([radius, cylinder_bottom, apex, top, outlet_radius, outlet_length, c, s]: [f64; 8]) -> Vessel {
     Vessel { radius, cylinder_bottom, apex, top, outlet_radius, outlet_length, ovality: [c, s] }
-}
-
-fn noise_law([floor, constant, linear, quadratic, power_factor, power]: [f64; 6]) -> NoiseLaw {
-    NoiseLaw { floor, constant, linear, quadratic, power_factor, power }
 }
 
 /// Volume of a silo (see `vessel`) below level planes at heights z.
@@ -61,7 +55,7 @@ impl ContentSetup {
             vessel: vessel(silo),
             covariance: matrix(&covariance)?,
             wall_std,
-            bias: DepthBias { offset: bias[0], scale: bias[1], quadratic: bias[2] },
+            bias: depth_bias(bias),
             noise: noise_law(noise),
             noise_known,
             range,
@@ -69,59 +63,49 @@ impl ContentSetup {
     }
 }
 
-/// Measures the content of a depth image (float32 (H, W), metres, with its camera) or of points (float32 (N, 3)).
-///
-/// `rays` (H, W, 2) are needed where the camera's lens distorts. Returns plain numbers, and the surface or None.
+/// A depth image, or points (N, 3) in metres.
+#[derive(FromPyObject)]
+enum Data<'py> {
+    Points(PyReadonlyArray2<'py, f32>),
+    Depth(DepthFrame<'py>),
+}
+
+impl Data<'_> {
+    /// Runs something on the core's view of it, without the interpreter's lock.
+    fn with_source<T: Send>(
+        &self,
+        py: Python<'_>,
+        run: impl Fn(Source<'_>) -> siloscope::Result<T> + Send + Sync,
+    ) -> PyResult<T> {
+        match self {
+            Self::Points(points) => {
+                let rows = arrays::rows_of_three(points)?;
+                py.detach(|| run(Source::Points(rows.as_chunks::<3>().0))).map_err(value_error)
+            }
+            Self::Depth(frame) => {
+                let buffers = frame.metres()?;
+                let image = buffers.image()?;
+                py.detach(|| run(Source::Depth(image))).map_err(value_error)
+            }
+        }
+    }
+}
+
+/// Measures the content of a depth image in float32 metres, or of points; the surface is None where there is none.
 #[pyfunction]
 fn content_measure<'py>(
     py: Python<'py>,
-    data: PyReadonlyArray2<'py, f32>,
-    camera: Option<&Bound<'py, PyAny>>,
-    rays: Option<PyReadonlyArray3<'py, f64>>,
+    data: Data<'py>,
     setup: &ContentSetup,
 ) -> PyResult<(Bound<'py, PyDict>, Option<ContentSurface>)> {
-    let content = with_source(py, &data, camera, rays.as_ref(), |source| measure(source, &setup.0))?;
+    let content = data.with_source(py, |source| measure(source, &setup.0))?;
     Ok((report(py, &content)?, ContentSurface::of_content(content)))
 }
 
 /// Distance from the axis of the farthest bare wall that a frame shows, and the size of the cells that tell; or None.
 #[pyfunction]
-fn content_bare_reach<'py>(
-    py: Python<'py>,
-    data: PyReadonlyArray2<'py, f32>,
-    camera: Option<&Bound<'py, PyAny>>,
-    rays: Option<PyReadonlyArray3<'py, f64>>,
-    setup: &ContentSetup,
-) -> PyResult<Option<[f64; 2]>> {
-    with_source(py, &data, camera, rays.as_ref(), |source| bare_reach(source, &setup.0))
-}
-
-/// Runs something on a depth image or on points, without the interpreter's lock.
-fn with_source<'py, T: Send>(
-    py: Python<'py>,
-    data: &PyReadonlyArray2<'py, f32>,
-    camera: Option<&Bound<'py, PyAny>>,
-    rays: Option<&PyReadonlyArray3<'py, f64>>,
-    run: impl Fn(Source<'_>) -> siloscope::Result<T> + Send + Sync,
-) -> PyResult<T> {
-    let camera = camera.map(convert::camera).transpose()?;
-    let shape = (data.shape()[0], data.shape()[1]);
-    let numbers = data.as_slice().map_err(value_error)?;
-    let rays = rays.map(|r| r.as_slice()).transpose().map_err(value_error)?;
-    let found = match &camera {
-        None if shape.1 == 3 => py.detach(|| run(Source::Points(numbers.as_chunks::<3>().0))),
-        None => return Err(value_error(format!("points have shape {shape:?}, expected (N, 3)"))),
-        Some(camera) if (camera.height, camera.width) != shape => {
-            let expected = (camera.height, camera.width);
-            return Err(value_error(format!("the depth has shape {shape:?}, its camera {expected:?}")));
-        }
-        Some(camera) => {
-            let rays = rays.map(|rays| rays.as_chunks::<2>().0);
-            let image = DepthImage::new(numbers, camera, rays).map_err(value_error)?;
-            py.detach(|| run(Source::Depth(image)))
-        }
-    };
-    found.map_err(value_error)
+fn content_bare_reach(py: Python<'_>, data: Data<'_>, setup: &ContentSetup) -> PyResult<Option<[f64; 2]>> {
+    data.with_source(py, |source| bare_reach(source, &setup.0))
 }
 
 fn matrix(covariance: &PyReadonlyArray2<'_, f64>) -> PyResult<Covariance> {
@@ -294,15 +278,12 @@ impl ContentSurface {
 #[pyo3(signature = (points, up, cell, noise))]
 fn content_relief(
     py: Python<'_>,
-    points: PyReadonlyArrayDyn<'_, f64>,
+    points: PyReadonlyArray2<'_, f64>,
     up: [f64; 3],
     cell: Option<f64>,
     noise: f64,
 ) -> PyResult<Option<ContentSurface>> {
-    if points.ndim() != 2 || points.shape()[1] != 3 {
-        return Err(value_error(format!("points have shape {:?}, expected (N, 3)", points.shape())));
-    }
-    let points: Vec<[f64; 3]> = points.as_slice().map_err(value_error)?.as_chunks::<3>().0.to_vec();
+    let points = arrays::points(&points)?;
     let relief = py.detach(|| Relief::new(&points, &Vec3::from(up), cell, noise)).map_err(value_error)?;
     Ok(relief.map(ContentSurface::of_relief))
 }

@@ -2,12 +2,16 @@
 
 use pyo3::prelude::*;
 
+mod arrays;
 mod camera;
 mod content;
 mod convert;
 mod depth;
 mod files;
+mod inputs;
+mod outcome;
 mod scene;
+mod shape_tensor_fit;
 mod steps;
 mod surface;
 
@@ -19,6 +23,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     depth::register(m)?;
     content::register(m)?;
     files::register(m)?;
+    outcome::register(m)?;
     scene::register(m)?;
     surface::register(m)?;
     steps::register(m)?;

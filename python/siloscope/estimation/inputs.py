@@ -27,17 +27,26 @@ SENTINEL = 65535
 
 
 @dataclass(frozen=True, eq=False)
-class Prepared:
-    """A frame as the methods take it: a depth image with its camera, or points.
+class PreparedDepth:
+    """A depth image as the methods take it: `depth` float32 (H, W), C-contiguous, metres, 0 for "no measurement"."""
 
-    `depth` float32 (H, W), C-contiguous, metres, 0 for "no measurement"; `points` float64 (N, 3), finite rows only.
-    """
-
-    depth: NDArray[np.float32] | None
-    camera: Camera | None
-    points: NDArray[np.float64] | None
+    depth: NDArray[np.float32]
+    camera: Camera
     gravity: NDArray[np.float64] | None
     config: dict[str, Any]
+
+
+@dataclass(frozen=True, eq=False)
+class PreparedPoints:
+    """A cloud as the methods take it: `points` float64 (N, 3), metres, finite rows only."""
+
+    points: NDArray[np.float64]
+    gravity: NDArray[np.float64] | None
+    config: dict[str, Any]
+
+
+Prepared = PreparedDepth | PreparedPoints
+"""A frame as the methods take it."""
 
 
 def prepare(
@@ -74,7 +83,7 @@ def prepare(
         points = points if box is None else points[within(points, box)]
         _not_empty(len(points), frame.source)
         _near_the_sensor(points, frame.source)
-        return Prepared(None, None, np.ascontiguousarray(points), frame.gravity, config)
+        return PreparedPoints(np.ascontiguousarray(points), frame.gravity, config)
     return _prepare_depth(frame, profile, mask, box, config)
 
 
@@ -84,7 +93,7 @@ def _prepare_depth(
     mask: ArrayLike | None,
     box: NDArray[np.float64] | None,
     config: dict[str, Any],
-) -> Prepared:
+) -> PreparedDepth:
     depth = metres(frame)
     chosen = frame.camera
     if chosen is None:
@@ -107,7 +116,7 @@ def _prepare_depth(
         depth = np.where(within(points, box), depth, np.float32(0))
     if (kept is not None or box is not None) and not (depth > 0).any():
         raise InputError(f"{frame.source}: mask and crop leave no pixel with a depth; check them against the picture")
-    return Prepared(np.ascontiguousarray(depth, np.float32), chosen, None, frame.gravity, config)
+    return PreparedDepth(np.ascontiguousarray(depth, np.float32), chosen, frame.gravity, config)
 
 
 def _frame(data: ArrayLike, camera: Camera | None) -> Frame:

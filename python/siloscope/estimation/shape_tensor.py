@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -10,9 +10,10 @@ from numpy.typing import NDArray
 
 from siloscope import _core
 from siloscope.estimation import steps
-from siloscope.estimation.surface import cell_size, refused
+from siloscope.estimation.surface import cell_size, ratios_of, refused, timing_ms
 from siloscope.types.camera import Camera
-from siloscope.types.estimate import Estimate, Ratios
+from siloscope.types.depth_frame import DepthFrame
+from siloscope.types.estimate import Estimate
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry
 
@@ -33,10 +34,6 @@ class Settings:
     partners: int = steps.PARTNERS
     threads: int = 1
 
-    def core(self, grid: float) -> tuple[float, int, str, float, float, int, int]:
-        """As the core takes them."""
-        return grid, self.neighbours, self.view, self.share, self.agreement, self.partners, self.threads
-
 
 def fit_depth(
     depth: NDArray[np.float32], camera: Camera, settings: Settings, config: dict[str, Any] | None = None
@@ -45,7 +42,7 @@ def fit_depth(
 
     Parameters
     ----------
-    depth : float32 (H, W), C-contiguous
+    depth : float32 (H, W)
         Measured depth z in metres; 0 or NaN where there is none.
     camera : Camera
         Intrinsics of the same size.
@@ -54,43 +51,38 @@ def fit_depth(
     config : dict, optional
         Effective settings to record in the estimate beside these.
     """
-    rays = None if camera.distortion_model == "none" else camera.rays().reshape(-1, 2)
-    grid = settings.grid or steps.GRID
-    found = _core.shape_tensor_image(depth, camera, rays, 1.0, None, settings.core(grid))
-    return _estimate(found, _recorded(config, settings, grid), pixels=True)
+    settings = replace(settings, grid=settings.grid or steps.GRID)
+    found = _core.shape_tensor_depth(DepthFrame.of(depth, camera), settings)
+    return _estimate(found, {**(config or {}), **asdict(settings)}, pixels=True)
 
 
 def fit_points(points: NDArray[np.float64], settings: Settings, config: dict[str, Any] | None = None) -> Estimate:
     """Run the six steps on a cloud (N, 3) in the camera frame, metres; rows that aren't finite are left out."""
-    grid = settings.grid or cell_size(points)
-    found = _core.shape_tensor_points(points, settings.core(grid))
-    return _estimate(found, _recorded(config, settings, grid), pixels=False)
+    settings = replace(settings, grid=settings.grid or cell_size(points))
+    found = _core.shape_tensor_points(points, settings)
+    return _estimate(found, {**(config or {}), **asdict(settings)}, pixels=False)
 
 
-def _recorded(config: dict[str, Any] | None, settings: Settings, grid: float) -> dict[str, Any]:
-    return {**(config or {}), **asdict(settings), "grid": grid}
-
-
-def _estimate(found: dict[str, Any], config: dict[str, Any], *, pixels: bool) -> Estimate:
-    if "refusal" in found:
-        return refused(METHOD, found["refusal"], config)
-    radius, bottom, apex = (found[name] or (None, None) for name in ("radius", "bottom", "apex"))
+def _estimate(found: _core.ShapeTensorFit | _core.Refusal, config: dict[str, Any], *, pixels: bool) -> Estimate:
+    if isinstance(found, _core.Refusal):
+        return refused(METHOD, found, config)
+    lengths = (found.radius, found.bottom, found.apex)
     return Estimate(
         "ok",
         METHOD,
-        pose=SiloPose(*found["pose"]),
-        covariance=found["covariance"],
-        silo=SiloGeometry(radius[0], bottom[0], apex[0]),
-        silo_std=SiloGeometry(radius[1], bottom[1], apex[1]),
-        pixel_ratios=_ratios(found["pixels"]) if pixels else None,
-        area_ratios=_ratios(found["areas"]) if pixels else None,
+        pose=SiloPose(*found.pose),
+        covariance=found.covariance,
+        silo=SiloGeometry(*(None if length is None else length.value for length in lengths)),
+        silo_std=SiloGeometry(*(None if length is None else length.std for length in lengths)),
+        pixel_ratios=ratios_of(found.pixels) if pixels else None,
+        area_ratios=ratios_of(found.areas) if pixels else None,
         config=config,
-        timing_ms={name.replace(" ", "_"): ms for name, ms in found["timing"]},
-        extra={"fit": {**found["evidence"], "misfit": found["misfit"]}},
+        timing_ms=timing_ms(found.stages),
+        extra={"fit": _quality(found)},
     )
 
 
-def _ratios(sums: list[float]) -> Ratios | None:
-    """Shares of cylinder, cone and feed among everything seen."""
-    seen = sum(sums[1:])
-    return Ratios(*(sums[label] / seen for label in (1, 2, 3))) if seen > 0 else None
+def _quality(found: _core.ShapeTensorFit) -> dict[str, Any]:
+    names = ("points", "candidates", "walls", "around", "along", "miss", "turn", "bend", "behind")
+    seen = found.diagnostics
+    return {**{name: getattr(seen, name) for name in names}, "misfit": found.model_error_std}

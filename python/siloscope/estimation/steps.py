@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from siloscope import _core
 from siloscope.errors import InputError, UsageError
 from siloscope.types.camera import Camera
+from siloscope.types.depth_frame import DepthFrame
 from siloscope.types.pose import SiloPose
 
 Vectors = NDArray[np.float64]
@@ -122,8 +123,7 @@ def back_project(
     if image.dtype == np.uint16 and depth_unit is None:
         raise InputError("depth is in raw units; give depth_unit, the metres per unit (0.001 for millimetres)")
     chosen = None if mask is None else np.require(np.asarray(mask) != 0, np.bool_, ["C", "A"])
-    rays = None if camera.distortion_model == "none" else camera.rays().reshape(-1, 2)
-    return _checked(_core.back_project, image, camera, rays, depth_unit or 1.0, chosen)[1]
+    return _checked(_core.back_project, DepthFrame.of(image, camera, depth_unit or 1.0, chosen))
 
 
 def voxel_grid(points: ArrayLike, size: float = GRID, threads: int = 1) -> Vectors:
@@ -131,7 +131,7 @@ def voxel_grid(points: ArrayLike, size: float = GRID, threads: int = 1) -> Vecto
 
     Points that aren't finite, or lie more than a million voxels from the origin, are left out.
     """
-    return _checked(_core.voxel_grid, _vectors("points", points), size, threads)[0]
+    return _checked(_core.voxel_grid, _vectors("points", points), size, threads)
 
 
 def nearest_neighbours(points: ArrayLike, k: int = NEIGHBOURS, threads: int = 1) -> NDArray[np.uint32]:
@@ -156,7 +156,8 @@ def shape_tensors(points: ArrayLike, neighbours: ArrayLike, normals: ArrayLike, 
     `neighbours` (N, k) and `normals` (N, 3) are those of `nearest_neighbours` and `normals`.
     """
     arrays = _finite("points", points), _indices(neighbours), _vectors("normals", normals)
-    return ShapeTensors(*_checked(_core.shape_tensors, *arrays, threads))
+    found = _checked(_core.shape_tensors, *arrays, threads)
+    return ShapeTensors(found.k1, found.k2, found.E1, found.E2)
 
 
 def select_candidates(
@@ -173,7 +174,9 @@ def select_candidates(
     arrays = _vectors("points", points), _indices(neighbours)
     curvatures = (np.require(k, np.float64, ["C", "A"]) for k in (tensors.k1, tensors.k2))
     directions = (_vectors(name, E) for name, E in (("E1", tensors.E1), ("E2", tensors.E2)))
-    return Candidates(*_checked(_core.select_candidates, *arrays, *curvatures, *directions, share, _view(view)))
+    checked = ShapeTensors(*curvatures, *directions)
+    found = _checked(_core.select_candidates, *arrays, checked, share, _view(view))
+    return Candidates(found.index, found.E1)
 
 
 def axis_direction(E1: ArrayLike) -> Vectors:
@@ -181,7 +184,7 @@ def axis_direction(E1: ArrayLike) -> Vectors:
 
     No pair is formed; X is the eigenvector of the smallest eigenvalue of Σ E1 E1ᵀ.
     """
-    return np.array(_checked(_core.axis_direction, _finite("E1", E1))[0])
+    return np.array(_checked(_core.axis_direction, _finite("E1", E1)))
 
 
 def consistent_direction(E1: ArrayLike, agreement: float = AGREEMENT) -> Axis:
@@ -192,8 +195,8 @@ def consistent_direction(E1: ArrayLike, agreement: float = AGREEMENT) -> Axis:
     """
     if not agreement > 0.0:
         raise UsageError(f"agreement must be above 0, got {agreement}")
-    X, agreeing = _checked(_core.consistent_direction, _finite("E1", E1), agreement)
-    return Axis(np.array(X), agreeing)
+    found = _checked(_core.consistent_direction, _finite("E1", E1), agreement)
+    return Axis(np.array(found.X), found.agreeing)
 
 
 def estimated_vectors(E1: ArrayLike, count: int = 2000, seed: int = 0) -> Vectors:

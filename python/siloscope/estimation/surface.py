@@ -2,40 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
-from siloscope.parameters import PARAMETERS
-from siloscope.reasons import estimate_refusals, sentence
-from siloscope.sensors import SensorProfile
+from siloscope.estimation.priors import DEPTH_BIAS, OVALITY, Priors
+from siloscope.parameters import BIAS, PARAMETERS
+from siloscope.reasons import sentence
 from siloscope.types.camera import Camera
-from siloscope.types.estimate import Estimate, Ratios, SurfaceDetails
+from siloscope.types.depth_frame import DepthFrame
+from siloscope.types.estimate import Estimate, PixelLabels, Ratios, SurfaceDetails
 from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import geometry_of
-
-OVALITY = PARAMETERS.index("oval_cos")
-
-DIAMETER_STD = 0.002
-"""Standard deviation of a tape-measured diameter, m."""
-
-GRAVITY_STD = 0.01
-"""Standard deviation of an accelerometer's direction at rest, rad (Table 7 of the paper: 5 to 12 mrad)."""
 
 
 def fit_depth(
     depth: NDArray[np.float32],
     camera: Camera,
-    profile: SensorProfile,
+    priors: Priors,
     *,
-    diameter: float | None = None,
-    diameter_std: float = DIAMETER_STD,
-    gravity: NDArray[np.float64] | None = None,
-    gravity_std: float = GRAVITY_STD,
     start: Estimate | None = None,
     ratios: bool = True,
     config: dict[str, Any] | None = None,
@@ -44,17 +32,12 @@ def fit_depth(
 
     Parameters
     ----------
-    depth : float32 (H, W), C-contiguous
+    depth : float32 (H, W)
         Measured depth z in metres; 0 or NaN where there is none.
     camera : Camera
         Intrinsics of the same size.
-    profile : SensorProfile
-        The sensor's depth error.
-    diameter, diameter_std : float, optional
-        Measured inner diameter of the silo's cylinder, m.
-    gravity : float (3,), optional
-        Direction of gravity in the camera frame, any length; used as a prior on the axis and reported against the
-        answer without it.
+    priors : Priors
+        What is known before; gravity is also reported against the answer.
     start : Estimate, optional
         Of another frame of the same camera: the wall is looked for there before it is searched.
     ratios : bool
@@ -62,28 +45,19 @@ def fit_depth(
     config : dict, optional
         Effective settings to record in the estimate.
     """
-    radius, pull = _priors(diameter, diameter_std, gravity, gravity_std)
+    frame = DepthFrame(depth, camera, camera.rays())
     wall = None if start is None or start.details is None else start.details.wall
-    frame = (depth, camera.rays(), profile.bias, profile.bias_std, profile.noise, radius, pull)
-    found = _core.surface_fit_image(*frame, wall=wall, ratios=ratios)
-    if "refusal" in found:
-        return refused("surface", found["refusal"], config or {})
-
-    def labelled() -> NDArray[np.uint8]:
-        labels: NDArray[np.uint8] = _core.surface_fit_image(*frame, labels=True, wall=wall)["labels"]
-        return labels
-
-    return _estimate(found, profile, config or {}, diameter, gravity, labelled)
+    found = _core.fit_depth(frame, priors, wall, ratios)
+    if isinstance(found, _core.Refusal):
+        return refused("surface", found, config)
+    return _estimate(found, priors, config, PixelLabels(found, frame))
 
 
 def fit_points(
     points: NDArray[np.float64],
+    priors: Priors,
     *,
     grid: float | None = None,
-    diameter: float | None = None,
-    diameter_std: float = DIAMETER_STD,
-    gravity: NDArray[np.float64] | None = None,
-    gravity_std: float = GRAVITY_STD,
     threads: int = 1,
     config: dict[str, Any] | None = None,
 ) -> Estimate:
@@ -94,16 +68,19 @@ def fit_points(
     points : float64 (N, 3)
         Points in the camera frame, metres; rows that aren't finite are left out. They are taken as they are: without
         rays, no depth bias can be told from them.
+    priors : Priors
+        What is known before, the profile being `CLOUD`.
     grid : float, optional
         Side of the voxel grid's cells in metres; None for `cell_size`.
-
-    The rest is as for `fit_depth`.
+    threads : int
+        Threads for what can be shared.
+    config : dict, optional
+        Effective settings to record in the estimate.
     """
-    radius, pull = _priors(diameter, diameter_std, gravity, gravity_std)
-    found = _core.surface_fit_cloud(points, grid or cell_size(points), radius, pull, threads)
-    if "refusal" in found:
-        return refused("surface", found["refusal"], config or {})
-    return _estimate(found, SensorProfile("none: a cloud is taken as it is"), config or {}, diameter, gravity)
+    found = _core.fit_points(points, priors, grid or cell_size(points), threads)
+    if isinstance(found, _core.Refusal):
+        return refused("surface", found, config)
+    return _estimate(found, priors, config)
 
 
 def cell_size(points: NDArray[np.float64]) -> float:
@@ -118,40 +95,37 @@ def cell_size(points: NDArray[np.float64]) -> float:
 GRID = 0.05
 """Side of the voxel grid's cells, m (step 1 of section 2.3)."""
 
-Prior = tuple[float, float] | None
-Pull = tuple[float, float, float, float] | None
 
-
-def _priors(
-    diameter: float | None, diameter_std: float, gravity: NDArray[np.float64] | None, gravity_std: float
-) -> tuple[Prior, Pull]:
-    """Radius and gravity with their standard deviations, as the core takes them."""
-    radius = None if diameter is None else (diameter / 2.0, diameter_std / 2.0)
-    if gravity is None:
-        return radius, None
-    return radius, (float(gravity[0]), float(gravity[1]), float(gravity[2]), gravity_std)
-
-
-def refused(method: str, slug: str, config: dict[str, Any]) -> Estimate:
+def refused(method: str, refusal: _core.Refusal, config: dict[str, Any] | None) -> Estimate:
     """An estimate without an answer; the message says what the reason means and what to try."""
-    message = sentence(estimate_refusals()[slug])
-    return Estimate("refused", method, reason=slug, message=message, config=config)
+    message = sentence((refusal.meaning, refusal.remedy))
+    return Estimate("refused", method, reason=refusal.slug, message=message, config=config or {})
+
+
+def timing_ms(stages: list[_core.StageTime]) -> dict[str, float]:
+    """Milliseconds of a method's stages by their names."""
+    return {stage.name.replace(" ", "_"): stage.ms for stage in stages}
+
+
+def ratios_of(sums: list[float]) -> Ratios | None:
+    """Shares of cylinder, cone and feed among everything seen; None where nothing is."""
+    seen = sum(sums[1:])
+    return Ratios(*(sums[label] / seen for label in (1, 2, 3))) if seen > 0 else None
 
 
 def _estimate(
-    found: dict[str, Any],
-    profile: SensorProfile,
-    config: dict[str, Any],
-    diameter: float | None,
-    gravity: NDArray[np.float64] | None,
-    labelled: Callable[[], NDArray[np.uint8]] | None = None,
+    fit: _core.SurfaceFit, priors: Priors, config: dict[str, Any] | None, labels: PixelLabels | None = None
 ) -> Estimate:
-    pose = SiloPose(*found["pose"])
-    covariance = found["covariance"]
-    silo, silo_std = geometry_of(found["radius"], found["cone"], covariance)
-    extra = {"sensor": _sensor(found, profile), "fit": _quality(found)}
-    if gravity is not None:
-        extra["gravity"] = _gravity_check(pose, gravity)
+    values = dict(zip(PARAMETERS, (v if np.isfinite(v) else None for v in fit.parameters.tolist()), strict=True))
+    pose = SiloPose(*(float(v) for v in fit.parameters[:4]))
+    covariance = fit.covariance
+    slope, intercept = values["cone_slope"], values["cone_intercept"]
+    cone = None if slope is None or intercept is None else (slope, intercept)
+    silo, silo_std = geometry_of(values["radius"], cone, covariance)
+    extra = {"sensor": _sensor(fit, covariance, priors), "fit": _quality(fit, slope)}
+    if priors.gravity is not None:
+        extra["gravity"] = _gravity_check(pose, priors.gravity)
+    seen = fit.coverage
     return Estimate(
         "ok",
         "surface",
@@ -159,47 +133,40 @@ def _estimate(
         covariance=covariance[:4, :4].copy(),
         silo=silo,
         silo_std=silo_std,
-        pixel_ratios=_ratios(found.get("pixel_counts")),
-        area_ratios=_ratios(found.get("areas")),
-        config=config,
-        timing_ms={name.replace(" ", "_"): ms for name, ms in found["timing"]},
+        pixel_ratios=None if seen is None else ratios_of(seen.counts),
+        area_ratios=None if seen is None else ratios_of(seen.areas),
+        config=config or {},
+        timing_ms=timing_ms(fit.stages),
         extra=extra,
-        evidence=_evidence(found, profile, diameter, gravity),
-        details=SurfaceDetails(found["points"], found["residuals"], found["wall"], labelled),
+        evidence=_factor(fit, priors),
+        details=SurfaceDetails(fit.points, fit.residuals, fit.warm_start, labels),
     )
 
 
-def _ratios(counts: Any) -> Ratios | None:
-    """Shares of cylinder, cone and feed among everything seen; None for clouds, whose points are no pixels."""
-    seen = 0.0 if counts is None else sum(counts[1:])
-    return Ratios(*(counts[k] / seen for k in (1, 2, 3))) if seen > 0 else None
-
-
-def _sensor(found: dict[str, Any], profile: SensorProfile) -> dict[str, Any]:
+def _sensor(fit: _core.SurfaceFit, covariance: NDArray[np.float64], priors: Priors) -> dict[str, Any]:
     """The depth error that the answer rests on: given, or estimated with the pose."""
-    free = found["free"][7:10]
-    std = np.sqrt(np.diag(found["covariance"]))[7:10]
-    names = ("offset", "scale", "quadratic")
+    free = fit.free[DEPTH_BIAS]
+    std = np.sqrt(np.diag(covariance))[DEPTH_BIAS]
     return {
-        "profile": profile.name,
-        "bias": dict(zip(names, found["bias"], strict=True)),
-        "bias_std": dict(zip(names, np.where(free, std, profile.bias_std).tolist(), strict=True)),
-        "bias_estimated": [n for n, f in zip(names, free, strict=True) if f],
+        "profile": priors.profile.name,
+        "bias": dict(zip(BIAS, fit.parameters[DEPTH_BIAS].tolist(), strict=True)),
+        "bias_std": dict(zip(BIAS, np.where(free, std, priors.profile.bias_std).tolist(), strict=True)),
+        "bias_estimated": [n for n, f in zip(BIAS, free, strict=True) if f],
     }
 
 
-def _quality(found: dict[str, Any]) -> dict[str, Any]:
-    evidence = found["evidence"]
+def _quality(fit: _core.SurfaceFit, cone_slope: float | None) -> dict[str, Any]:
+    wall = fit.diagnostics
     return {
-        "wall_patches": evidence["patches"],
-        "chi_square": found["chi_square"],
-        "misfit": found["misfit"],
-        "cone_slope": None if found["cone"] is None else found["cone"][0],
-        "ovality": float(np.hypot(*found["ovality"])) if any(found["free"][10:]) else None,
-        "seen_from": "inside" if found["inside"] else "outside",
-        "arc": evidence["arc"],
-        "turn": evidence["turn"],
-        "bend": evidence["bend"],
+        "wall_patches": wall.tiles,
+        "chi_square": fit.chi_square,
+        "misfit": fit.model_error_std,
+        "cone_slope": cone_slope,
+        "ovality": float(np.hypot(*fit.parameters[OVALITY])) if fit.free[OVALITY].any() else None,
+        "seen_from": "inside" if fit.inside else "outside",
+        "arc": wall.arc,
+        "turn": wall.turn,
+        "bend": wall.bend,
     }
 
 
@@ -211,32 +178,21 @@ def _gravity_check(pose: SiloPose, gravity: NDArray[np.float64]) -> dict[str, fl
     return {"r_x": from_gravity.r_x, "r_y": from_gravity.r_y, "angle_to_axis": angle}
 
 
-def _evidence(
-    found: dict[str, Any], profile: SensorProfile, diameter: float | None, gravity: NDArray[np.float64] | None
-) -> FrameFactor:
-    slope, intercept = found["cone"] or (np.nan, np.nan)
-    radius = np.nan if found["radius"] is None else found["radius"]
-    prior = found["prior"]
-    free = np.array(found["free"]) | (np.arange(len(PARAMETERS)) >= OVALITY) & (prior > 0.0)
-    expected = np.full(len(PARAMETERS), np.nan)
-    expected[7:10] = profile.bias
-    expected[OVALITY:] = 0.0
-    if diameter is not None:
-        expected[4] = diameter / 2.0
-    if gravity is not None:
-        tilt = SiloPose.from_axis(gravity, np.zeros(3))
-        expected[:2] = tilt.r_x, tilt.r_y
+def _factor(fit: _core.SurfaceFit, priors: Priors) -> FrameFactor:
+    """The frame's factor with its priors beside it; ovality is estimated wherever it has a prior."""
+    factor, free = fit.factor, fit.free
+    prior = factor.prior_information
+    free[OVALITY] |= prior[OVALITY] > 0.0
     return FrameFactor(
-        parameters=np.array([*found["pose"], radius, slope, intercept, *found["bias"], *found["ovality"]])
-        + found["step"],
-        information=found["information"],
-        gradient=found["gradient"],
-        scatter=found["scatter"],
-        noise=found["noise_share"],
+        parameters=fit.parameters + factor.step,
+        information=factor.information,
+        gradient=factor.gradient,
+        scatter=factor.scatter,
+        noise=factor.noise,
         free=free,
-        prior_mean=expected,
+        prior_mean=priors.mean,
         prior_information=prior,
-        scale_std=0.0 if free[8] else profile.bias_std[1],
-        linearization_point=found["base"],
-        rays=found["rays"],
+        scale_std=0.0 if free[DEPTH_BIAS][1] else priors.profile.bias_std[1],
+        linearization_point=factor.linearization_point,
+        rays=factor.rays,
     )

@@ -3,7 +3,7 @@
 A frame's equations hold near their linearization point. A frame that estimates the depth bias together with the wall
 has a likelihood with a bent valley: offset and quadratic error against radius, position and tilt. Two bent valleys do
 not meet where the straight lines through their far ends meet. Each frame keeps some of its rays. In the readings that
-walls predict on these rays the valley is straight (`_core.surface_seen_from`). So the equations are mapped to the
+walls predict on these rays the valley is straight (`_core.map_increment`). So the equations are mapped to the
 frames' common answer, which then is the minimum of the sum of the bent valleys.
 """
 
@@ -102,7 +102,8 @@ def _relinearized_at(factors: FrameFactors, place: Matrix) -> FrameFactors:
 
 def _linearized_at(factors: FrameFactors, place: Matrix) -> tuple[Matrix, Matrix, Matrix]:
     """Information and gradient of the frames at `place`, and the Jacobian of the parameter map."""
-    step, jacobian = _core.surface_seen_from(factors.linearization_point, factors.rays, factors.free, place)
+    found = _core.map_increment(factors.linearization_point, factors.rays, factors.free, place)
+    step, jacobian = found.step, found.jacobian
     from_answer = step + np.nan_to_num(factors.linearization_point - factors.answers)
     gradient = factors.gradient + np.einsum("nij,nj->ni", factors.information, from_answer)
     return _congruent(factors.information, jacobian), np.einsum("nji,nj->ni", jacobian, gradient), jacobian

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
-from siloscope.estimation.surface import GRAVITY_STD
+from siloscope.estimation.priors import GRAVITY_STD
 from siloscope.reproduction.solvers import ALL, SOLVERS
 from siloscope.reproduction.trials import STRIDE
 from siloscope.simulation import Silo, SimulatedFrame, metrics

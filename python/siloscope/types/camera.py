@@ -70,6 +70,9 @@ class Camera:
         except ValueError as error:
             raise InputError(f"camera: {error}") from None
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # without the cached rays
+
     def rays(self) -> NDArray[np.float64]:
         """Undistorted ray ``(x/z, y/z)`` of every pixel: float64 array (height, width, 2), read-only, cached."""
         rays: NDArray[np.float64] | None = self.__dict__.get("_rays")

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import zlib
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope import _core
 from siloscope.schema import ESTIMATE
+from siloscope.types.by_value import ByValue, same
+from siloscope.types.depth_frame import DepthFrame
 from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry
@@ -29,8 +31,36 @@ class Ratios:
         return {"cylinder": self.cylinder, "cone": self.cone, "feed": self.feed}
 
 
-@dataclass(frozen=True, eq=False)
-class SurfaceDetails:
+class PixelLabels:
+    """Label of each pixel of a frame, worked out from the fit when first asked for. A pickle holds the labels alone."""
+
+    def __init__(self, fit: _core.SurfaceFit, frame: DepthFrame) -> None:
+        self._source: tuple[_core.SurfaceFit, DepthFrame] | NDArray[np.uint8] = (fit, frame)
+
+    @property
+    def image(self) -> NDArray[np.uint8]:
+        """(H, W) 0 none, 1 cylinder, 2 cone, 3 feed, 4 other."""
+        source = self._source
+        if isinstance(source, tuple):
+            fit, frame = source
+            source = self._source = fit.labels(frame)
+        return source
+
+    def __getstate__(self) -> tuple[tuple[int, ...], bytes]:
+        return self.image.shape, zlib.compress(self.image.tobytes(), 1)
+
+    def __setstate__(self, state: tuple[tuple[int, ...], bytes]) -> None:
+        shape, packed = state
+        self._source = np.frombuffer(zlib.decompress(packed), np.uint8).reshape(shape).copy()
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, PixelLabels) and same(self.image, other.image)
+
+    __hash__ = None  # type: ignore[assignment]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceDetails(ByValue):
     """What pictures show of a fit.
 
     `points` (N, 3): patches in the silo frame, m; `residuals` (N,): their distance from the wall, m, NaN where a patch
@@ -39,19 +69,19 @@ class SurfaceDetails:
 
     points: NDArray[np.float64]
     residuals: NDArray[np.float64]
-    wall: Any = None
-    """Where the frame's patches show the wall, for other frames of the camera to start from: a tuple that only the core
-    reads. None for clouds."""
-    _labelled: Callable[[], NDArray[np.uint8]] | None = None
+    wall: _core.WarmStart | None = None
+    """Where the frame's patches show the wall, for other frames of the camera to start from; None for clouds."""
+    pixel_labels: PixelLabels | None = field(default=None, repr=False)
+    """None for clouds."""
 
-    @cached_property
+    @property
     def labels(self) -> NDArray[np.uint8] | None:
         """Label of each pixel (H, W): 0 none, 1 cylinder, 2 cone, 3 feed, 4 other. Computed on first access."""
-        return None if self._labelled is None else self._labelled()
+        return None if self.pixel_labels is None else self.pixel_labels.image
 
 
-@dataclass(frozen=True, eq=False)
-class Estimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Estimate(ByValue):
     """Pose of the camera in its silo from one frame. Radians and metres.
 
     A refused estimate (`status` "refused") has no pose: its numbers are None, and `reason` (a stable slug) and
@@ -72,7 +102,8 @@ class Estimate:
     message: str | None = None
     config: dict[str, Any] = field(default_factory=dict)
     """The effective settings."""
-    timing_ms: dict[str, float] = field(default_factory=dict)
+    timing_ms: dict[str, float] = field(default_factory=dict, compare=False)
+    """Milliseconds by stage; no part of the answer, so it is not compared."""
     extra: dict[str, Any] = field(default_factory=dict)
     """Further keys of the JSON document, such as the gravity check."""
     evidence: FrameFactor | None = None

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.parameters import SIZE
+from siloscope.types.by_value import ByValue
 
 Vector = NDArray[np.float64]
 Matrix = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
-class FrameFactor:
+@dataclass(frozen=True, eq=False, repr=False)
+class FrameFactor(ByValue):
     """What one frame says about all parameters, without priors: what `calibrate` fuses.
 
     Vectors are (12,) in the order of `PARAMETERS`, matrices (12, 12). Near `parameters` the frame's negative
@@ -60,8 +61,8 @@ class FrameFactor:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class SummedFactor:
+@dataclass(frozen=True, eq=False, repr=False)
+class SummedFactor(ByValue):
     """Factors added up about `origin` (12,): what remains of frames whose own factor is not kept.
 
     `information` is Σ w Λ, `pull` Σ w (Λ (θ - origin) - g), `noise` Σ w² N, `weight` Σ w; and `weight`
