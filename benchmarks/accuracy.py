@@ -1,15 +1,17 @@
-"""How far off the answers are: PC average distance (Eq. 11) over the paper's silos and unseen ones.
+"""How far off the answers are: PC average distance (Eq. 11) over the paper's silos, unseen ones, and every other kind.
 
 python -m benchmarks.accuracy --write
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 from benchmarks import trials
+from benchmarks.kinds import KINDS, case
 from benchmarks.trials import DIAMETER, KNOWN, LIDAR_PROFILE, NOTHING, Knowledge
 
 from siloscope.simulation import Feed, Scene
@@ -28,12 +30,24 @@ class Row:
     worst: float
     perturbed: bool = True
     big: bool = False
+    kind: str | None = None
+    """Of `benchmarks.kinds`."""
 
     def scenes(self, seeds: range) -> list[tuple[str, Scene]]:
         """Its scenes, with their names."""
+        if self.kind:
+            return [(f"unseen {seed}", case(self.kind, seed).scene) for seed in seeds]
         if self.big:
             return trials.big_silos(seeds, self.feed)
         return trials.silos(seeds, self.feed, perturbed=self.perturbed)
+
+
+NAN = float("nan")
+"""No goal is set."""
+
+
+def _known(kind: str) -> Knowledge:
+    return KNOWN.of(case(kind, 0).profile)
 
 
 ROWS = (
@@ -44,14 +58,15 @@ ROWS = (
     Row("perturbed, profile unknown, diameter known", GAUSSIAN, DIAMETER, 2.0, 6.0),
     Row("perturbed, nothing known", GAUSSIAN, NOTHING, 12.0, 30.0),
     Row("radius 6–12 m, LiDAR-like", GAUSSIAN, Knowledge("profile known", LIDAR_PROFILE), 1.0, 5.0, big=True),
+    *(Row(f"{kind}, profile known", GAUSSIAN, _known(kind), NAN, NAN, kind=kind) for kind in KINDS if kind != "exact"),
 )
 
 
-def measured(row: Row, scene: Scene) -> tuple[float, str | None]:
-    """PC average distance in mm and the reason of a refusal."""
+def measured(row: Row, scene: Scene) -> tuple[float, str | None, bool]:
+    """PC average distance in mm, the reason of a refusal, and whether the answer is sure and wrong."""
     frame = scene.render()
     estimate = row.knowledge.locate(frame)
-    return trials.distance(frame, estimate), estimate.reason
+    return trials.distance(frame, estimate), estimate.reason, estimate.ok and trials.sure_and_wrong(estimate, scene)
 
 
 def main() -> None:
@@ -62,15 +77,23 @@ def main() -> None:
     for row in ROWS if options.row < 0 else (ROWS[options.row],):
         scenes = row.scenes(seeds)
         found = list(trials.each([s for _, s in scenes], partial(measured, row), options.jobs, row.name))
-        for (name, _), (gap, reason) in zip(scenes, found, strict=True):
+        for (name, _), (gap, reason, _) in zip(scenes, found, strict=True):
             if options.list or reason or gap > row.worst:
                 print(f"  {name}: {reason or f'{gap:.3f} mm'}")
-        gaps = np.array([gap for gap, reason in found if reason is None])
+        gaps = np.array([gap for gap, reason, _ in found if reason is None])
         refused = len(found) - len(gaps)
-        numbers = (f"{np.median(gaps):.3f}", f"{row.median:g}", f"{gaps.max():.3f}", f"{row.worst:g}")
-        lines.append((row.name, len(found), *numbers, refused))
-    head = ("frames", "silos", "median, mm", "goal", "worst, mm", "goal", "refused")
+        numbers = (_figure(gaps, np.median), _goal(row.median), _figure(gaps, np.max), _goal(row.worst))
+        lines.append((row.name, len(found), *numbers, refused, sum(wrong for _, _, wrong in found)))
+    head = ("frames", "silos", "median, mm", "goal", "worst, mm", "goal", "refused", "sure and wrong")
     trials.publish("accuracy", trials.table(head, lines), options.write, "benchmarks.accuracy")
+
+
+def _figure(gaps: np.ndarray, of: Callable[[np.ndarray], float]) -> str:
+    return f"{of(gaps):.3f}" if len(gaps) else "–"
+
+
+def _goal(value: float) -> str:
+    return f"{value:g}" if value == value else "–"
 
 
 if __name__ == "__main__":

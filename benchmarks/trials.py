@@ -19,6 +19,9 @@ from siloscope.sensors import SensorProfile
 from siloscope.simulation import ASTRA_S, PERFECT, Feed, Scene, SimulatedFrame, metrics
 from siloscope.simulation.scenarios import random_big_scene, random_scene, scenario
 
+sys.path.append(str(Path(__file__).parents[1] / "tests"))
+from oracle import judging
+
 ROOT = Path(__file__).parents[1]
 ACCURACY_PAGE = ROOT / "docs" / "accuracy.md"
 
@@ -47,6 +50,10 @@ class Knowledge:
     def calibrate(self, scenes: Sequence[Scene]) -> Calibration:
         """The calibration from simulated frames of one camera in one silo, one frame of each scene."""
         return siloscope.calibrate((scene.render().frame() for scene in scenes), **self._of(scenes[0]))
+
+    def of(self, profile: str) -> Knowledge:
+        """The same about another sensor; nothing where the sensor is not known."""
+        return replace(self, profile=profile if self.profile else None)
 
     def _of(self, scene: Scene) -> dict[str, Any]:
         return {"sensor": self.profile, "diameter": 2.0 * scene.silo.radius if self.diameter else None}
@@ -115,6 +122,17 @@ def publish(name: str, text: str, write: bool, module: str, page: Path = ACCURAC
     start, end = f"<!-- {name} -->", f"<!-- end of {name} -->"
     before, after = whole.split(start)[0], whole.split(end)[1]
     page.write_text(f"{before}{start}\n{text}\n\nMade by `{command}`.\n{end}{after}")
+
+
+def again(scene: Scene, number: int) -> Scene:
+    """The scene with other noise."""
+    return replace(scene, seed=(scene.seed * 1_000_003 + number) % 2**64)
+
+
+def sure_and_wrong(answer: Estimate | Calibration, scene: Scene) -> bool:
+    """Whether a given pose is off by more than 4 stated deviations, and by more than 10 mm or 5 mrad."""
+    stated = answer.to_dict()
+    return any(judging.sure_and_wrong(k, stated[k] - getattr(scene.pose, k), stated["std"][k]) for k in judging.POSE)
 
 
 def pose_error(estimate: Estimate, scene: Scene) -> np.ndarray:

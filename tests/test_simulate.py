@@ -14,7 +14,7 @@ from PIL import Image
 import siloscope
 from siloscope.cli import main
 from siloscope.io import camera_files
-from siloscope.simulation import ASTRA_S, Feed
+from siloscope.simulation import ASTRA_S, Feed, true_camera
 from siloscope.simulation.scenarios import SILO2
 
 SMALL = ["--width", "64", "--height", "48"]
@@ -143,3 +143,14 @@ def test_a_folder_with_files_or_a_file_is_not_overwritten(tmp_path: Path, capsys
     assert "not empty" in capsys.readouterr().err
     assert main(["simulate", "--out", str(tmp_path / "old.png"), *SMALL]) == 2
     assert (tmp_path / "old.png").read_bytes() == b"old"
+
+
+def test_the_camera_that_is_told_is_off_by_its_deviations(tmp_path: Path) -> None:
+    out = tmp_path / "off"
+    options = ["--intrinsics", "calibrated", "--seed", "3", "--multipath", "0.1", *SMALL]
+    assert main(["simulate", "--out", str(out), "--scenario", "silo2", *options]) == 0
+    told, scene = camera_files.load(out / "camera.json"), json.loads((out / "truth.json").read_text())["scene"]
+    assert scene["told"]["fx"] == told.fx
+    assert scene["camera"]["fx"] == true_camera(told, "calibrated", 3).fx != told.fx
+    assert scene["sensor"]["multipath"] == 0.1
+    assert main(["simulate", "--out", str(tmp_path / "no"), "--intrinsics", "guessed", *SMALL]) == 2

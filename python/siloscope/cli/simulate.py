@@ -15,7 +15,7 @@ from siloscope.cli.outcome import print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.errors import UsageError
 from siloscope.io import camera_files, writers
-from siloscope.simulation import DEFECTS, Feed, Scene, SimulatedFrame, defects, discharge, sensor_model
+from siloscope.simulation import DEFECTS, Feed, Scene, SimulatedFrame, defects, discharge, sensor_model, true_camera
 from siloscope.simulation.scenarios import SCENARIOS, scenario
 from siloscope.types.camera import Camera
 from siloscope.types.pose import SiloPose
@@ -27,6 +27,8 @@ MOST_STEPS = 100_000
 PERFECT_UNIT = 0.00025
 """Metres per raw unit where no sensor names one: fine for a perfect silo, and 16 bits still reach 16 m."""
 
+_INTRINSICS = "How well camera.json is known: exact, calibrated or nominal; the true camera is drawn and in truth.json."
+_MULTIPATH = "Share of the light that surfaces throw back, for a ToF sensor: 0 to 1."
 _SCENARIO = f"Silo, camera and pose to start from: {', '.join(SCENARIOS)}."
 _FEED = "gaussian, funnel, mound or flat, with any of tilted, lumpy, rathole after '+'; none for empty."
 _LEVEL = "Highest feed point as a share of the silo's height; of the first frame, with --steps."
@@ -52,6 +54,7 @@ def simulate(
     dust: Annotated[float | None, typer.Option(help="Share of pixels that read dust.")] = None,
     dropout: Annotated[float | None, typer.Option(help="Share of pixels without measurement.")] = None,
     flying: Annotated[float | None, typer.Option(help="Share of edge pixels that fly between two surfaces.")] = None,
+    multipath: Annotated[float | None, typer.Option(help=_MULTIPATH)] = None,
     max_incidence: Annotated[float | None, typer.Option(help="Steepest incidence measured, degrees.")] = None,
     camera: Annotated[Path | None, typer.Option(help="Camera file: JSON, TOML, or ROS camera_info YAML.")] = None,
     width: Annotated[int | None, typer.Option(help="Image width; focal lengths scale with it.")] = None,
@@ -60,6 +63,7 @@ def simulate(
     fy: Annotated[float | None, typer.Option(help="Focal length, pixels.")] = None,
     cx: Annotated[float | None, typer.Option(help="Principal point, pixels.")] = None,
     cy: Annotated[float | None, typer.Option(help="Principal point, pixels.")] = None,
+    known: Annotated[str, typer.Option("--intrinsics", help=_INTRINSICS)] = "exact",
     seed: Annotated[int, typer.Option(help="Draws noise, lumps, dents and cables.")] = 0,
     depth_unit: Annotated[float | None, typer.Option(help="Metres per raw unit of the PNG files.")] = None,
     exact: Annotated[bool, typer.Option("--exact", help="Write float64 metres (.npy) instead of 16-bit PNG.")] = False,
@@ -80,14 +84,15 @@ def simulate(
         silo["outlet_offset"] = tuple(_numbers("--outlet-offset", outlet_offset, "x,y in metres", 2))
     scene = replace(scene, silo=replace(scene.silo, **silo), seed=seed)
     scene = replace(scene, pose=_pose(pose) if pose else scene.pose, feed=_feed(scene.feed, feed, level, seed))
-    errors = _given(dust=dust, dropout=dropout, flying=flying)
+    errors = _given(dust=dust, dropout=dropout, flying=flying, multipath=multipath)
     if max_incidence is not None:
         errors["max_incidence"] = math.radians(max_incidence)
     model = sensor_model(sensor, device) if sensor else scene.sensor
     scene = replace(scene, sensor=replace(model, **errors))
     scene = replace(scene, defects=defects(defect_names, seed) if defect_names else scene.defects)
     intrinsics = _given(fx=fx, fy=fy, cx=cx, cy=cy)
-    scene = replace(scene, camera=_camera(scene.camera, camera, width, height, intrinsics))
+    told = _camera(scene.camera, camera, width, height, intrinsics)
+    scene = replace(scene, camera=true_camera(told, known, seed), told=None if known == "exact" else told)
     scenes = _scenes(scene, steps, level)
     unit = None if exact else _unit(depth_unit, sensor)
     document = _write(scenes, out, unit, labels, threads)
@@ -170,7 +175,7 @@ def _write(scenes: list[Scene], out: Path, unit: float | None, labels: bool, thr
             frames.append(_write_frame(frame, out, f"frame_{index:04d}", unit, labels))
     document = _document(scenes[0], unit, frames)
     with writing(out):
-        camera_files.dump(scenes[0].camera, out / "camera.json", unit)
+        camera_files.dump(scenes[0].told or scenes[0].camera, out / "camera.json", unit)
         (out / "truth.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return document
 

@@ -71,6 +71,8 @@ class Defects:
     """A sweep auger, 0.2 m thick, from the axis to the wall at the cylinder's bottom."""
     auger_azimuth: float = 0.8
     """Its direction."""
+    bars: tuple[Bar, ...] = ()
+    """Round bars at given places of the silo frame: beams, cables, pipes."""
     seed: int = 0
     """Draws the places of dents and cables."""
 
@@ -82,7 +84,7 @@ class Defects:
 
     def resolved(self, silo: Silo) -> ResolvedDefects:
         """Everything at its place in a silo."""
-        bundles = [self._cables(silo)]
+        bundles = [self._cables(silo), *([bar] for bar in self.bars)]
         if self.ladder:
             bundles.append(_ladder(silo, self.ladder_azimuth))
         if self.auger:
