@@ -31,6 +31,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 import camera_texts
 import frame_files
+import more_files
 import recording_files
 import siloscope
 from siloscope import InputError
@@ -58,6 +59,7 @@ SEEDS: dict[str, Callable[[], bytes]] = {
     **frame_files.MAKERS,
     **{name: _first_lines(name, count) for name, count in _SHORT.items()},
     **recording_files.MAKERS,
+    **more_files.MAKERS,
     **{f"camera{suffix}": _camera_file(suffix) for suffix in (".json", ".toml", ".yaml")},
     **{f"camera, {name}": text.encode for name, text in (camera_texts.PLAIN | camera_texts.LENSES).items()},
     "camera, Kalibr": camera_texts.KALIBR.encode,

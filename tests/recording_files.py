@@ -207,7 +207,6 @@ def _foxglove(encoding: str) -> bytes:
         [
             ("/cam/calibration", "foxglove.CameraCalibration", foxglove.calibration((16, 12), K)),
             ("/cam/image", "foxglove.RawImage", foxglove.raw_image(RAW[0])),
-            ("/cam/compressed", "foxglove.CompressedImage", foxglove.compressed_image(png16(RAW[0]), "png")),
             ("/points", "foxglove.PointCloud", foxglove.point_cloud(points)),
         ],
         encoding,

@@ -33,7 +33,7 @@ BAD_PLY = {
     "gigantic before": (ply(ASCII, f"element o {10**14}", "property int i", "element vertex 1", *AXES), "can't hold"),
     "list of points": (ply(LITTLE, "element vertex 1", "property list uchar int x"), "has the list 'x'"),
     "list before": (
-        ply(LITTLE, "element face 1", "property list uchar int i", "element vertex 1", *AXES), "'face' has the list"
+        ply(LITTLE, "element face 1", "property list uchar int i", "element vertex 1", *AXES), "1 vertices but the file"
     ),
     "unknown type": (ply(LITTLE, "element vertex 1", "property half x"), "'property half x' is wrong"),
     "property first": (ply(LITTLE, "property float x"), "'property float x' is wrong"),

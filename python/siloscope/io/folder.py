@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
@@ -16,7 +17,7 @@ from siloscope.errors import InputError
 from siloscope.io.arrays import npy, npz
 from siloscope.io.beside import take_camera_beside
 from siloscope.io.clouds import pcd, ply
-from siloscope.io.images import png, tiff
+from siloscope.io.images import netpbm, png, tiff, viewer_raw
 from siloscope.io.source import Format, FrameSource, Item, Options
 from siloscope.types.frame import Frame
 
@@ -27,7 +28,7 @@ TUM_DEPTH_UNIT = 0.0002
 FRAME_LIST = "frames.json"
 """What `siloscope convert` writes beside the frames: their names, times and gravity."""
 
-_FORMATS = (png.FORMAT, tiff.FORMAT, npy.FORMAT, npz.FORMAT, ply.FORMAT, pcd.FORMAT)
+_FORMATS = tuple(module.FORMAT for module in (png, tiff, netpbm, viewer_raw, npy, npz, ply, pcd))
 _LARGEST_LIST = 64 << 20
 _ALONE = Options(beside=False)
 
@@ -46,6 +47,9 @@ class FolderSource(FrameSource):
         self._gravity: list[Any] = [None] * len(files)
         if size := self._image_size:
             take_camera_beside(self, size, *dict.fromkeys([path, self.files[0].parent]))
+        if format is viewer_raw.FORMAT and self.file_camera is None and not options.cameras:
+            with viewer_raw.ViewerRawSource(self.files[0], options) as first:
+                self.file_camera, self.provenance["camera_from"] = first.file_camera, first.provenance["camera_from"]
 
     @cached_property
     def _first(self) -> FrameSource:
@@ -86,8 +90,16 @@ def _open(path: Path, options: Options) -> FrameSource:
         if folder.is_dir() and (found := _frame_files(folder)):
             return _open_files(path, options, folder, found)
     raise InputError(
-        f"{path}: a folder without 16-bit PNG, TIFF, NumPy, PLY or PCD frames; give the folder that holds them"
+        f"{path}: a folder without depth frames (16-bit PNG or PGM, TIFF, PFM, NumPy, the Viewer's .raw, PLY, PCD)"
+        f"{_what_it_has(path)}; give the folder that holds them"
     )
+
+
+def _what_it_has(path: Path) -> str:
+    """How many files of which endings, for a message."""
+    found = Counter(file.suffix.lower() or "no ending" for file in path.iterdir() if file.is_file())
+    listed = ", ".join(f"{count} {suffix}" for suffix, count in found.most_common(5))
+    return f", but with {listed}" if listed else ", and without files"
 
 
 def _open_files(path: Path, options: Options, folder: Path, found: dict[str, list[Path]]) -> FrameSource:

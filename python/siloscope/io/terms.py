@@ -21,7 +21,7 @@ WIDEST_M = 200.0
 NEAREST_M = 0.05
 """Median depth, or extent of points, below which a given unit is not meant for values that are metres already."""
 
-_UNITLESS_CLOUDS = ("ply", "pcd", "xyz", "npy", "npz", "folder")
+_UNITLESS_CLOUDS = ("ply", "pcd", "xyz", "obj", "off", "npy", "npz", "folder")
 
 
 @dataclass(frozen=True)

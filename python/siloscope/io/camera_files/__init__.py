@@ -35,6 +35,7 @@ __all__ = [
     "parse",
     "parse_json",
     "read",
+    "text_of",
 ]
 
 LARGEST_FILE = 1 << 20
@@ -55,7 +56,7 @@ def load(path: str | PathLike[str], size: tuple[int, int] | None = None) -> Came
 
 def read(path: str | PathLike[str]) -> CameraFile:
     """All that a camera file says; raises `InputError` naming the file and the field."""
-    return parse(str(path), _text(Path(path)))
+    return parse(str(path), text_of(Path(path)))
 
 
 def parse(name: str, text: str) -> CameraFile:
@@ -82,7 +83,8 @@ def parse_json(name: str, text: str) -> CameraFile:
     return from_document(name, document)
 
 
-def _text(path: Path) -> str:
+def text_of(path: Path) -> str:
+    """The text of a camera file, UTF-8 or UTF-16; raises `InputError`."""
     try:
         if not path.is_file():
             raise InputError(f"{path}: no such camera file; check the path")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.errors import InputError
-from siloscope.io.source import FrameSource, Item, Options, check_image_size
+from siloscope.io.source import MAX_SIDE, FrameSource, Item, Options, check_image_size
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
 
@@ -101,6 +101,28 @@ def _organised(name: str, frame: Frame, grid: tuple[int, int] | None) -> Frame:
     check_image_size(name, columns, rows)
     labels = labels if labels is None else labels.reshape(rows, columns)
     return with_recovered_camera(replace(frame, points=points.reshape(rows, columns, 3), labels=labels))
+
+
+_MOST_HOLES = 4
+"""Places of a grid for a point that it has, above which the pixels' places are no use."""
+
+
+def by_pixel(frame: Frame, pixels: NDArray[np.float64]) -> Frame:
+    """Points (N, 3) laid out by their pixels' column and row (N, 2), as an organised frame with its camera.
+
+    Where every other pixel was kept, so is the grid; places that are no whole numbers leave the points as they are.
+    """
+    points = frame.points
+    if points is None or not np.all((pixels >= 0) & (pixels < MAX_SIDE) & (pixels == np.floor(pixels))):
+        return frame
+    places = pixels.astype(np.int64) - pixels.min(axis=0).astype(np.int64)
+    places //= np.maximum(1, np.gcd.reduce(places, axis=0))
+    columns, rows = (places.max(axis=0) + 1).tolist()
+    if rows * columns > _MOST_HOLES * len(points):
+        return frame
+    grid = np.full((rows, columns, 3), np.nan, points.dtype)
+    grid[places[:, 1], places[:, 0]] = points
+    return with_recovered_camera(replace(frame, points=grid))
 
 
 def with_recovered_camera(frame: Frame) -> Frame:

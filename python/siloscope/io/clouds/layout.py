@@ -13,9 +13,11 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?|[+-]?(nan|inf|inf
 _COMMA_NUMBER = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 _FORTRAN = re.compile(r"\d[dD][+-]?\d")
 _COMMENTS = ("#", "//", "%")
-_AXES = {"x": ("x", "points:0", "coordx"), "y": ("y", "points:1", "coordy"), "z": ("z", "points:2", "coordz")}
-_UNITS = {"": 1.0, "m": 1.0, "cm": 0.01, "mm": 0.001}
-_NAME = re.compile(r"([a-z:]+\d?)[\s_]*[\[(]?(mm|cm|m|)[\])]?")
+_AXES = {"x": ("x", "points:0", "coordx"), "y": ("y", "points:1", "coordy"), "z": ("z", "points:2", "coordz", "depth")}
+_UNITS = {"": 1.0, "m": 1.0, "meters": 1.0, "metres": 1.0, "cm": 0.01, "mm": 0.001}
+_PIXEL = ("i", "j")
+"""Columns of the pixel's place, as rs-convert names them."""
+_NAME = re.compile(r"([a-z:]+\d?)[\s_]*[\[(]?(mm|cm|meters|metres|m|)[\])]?")
 SMALLEST_IMAGE = (8, 16)
 """Rows and columns from which a table without a header is a depth image."""
 
@@ -36,6 +38,8 @@ class Layout:
         Where x, y and z are; None for a depth image.
     label : int or None
         Where a label is.
+    pixel : tuple of int, int, or None
+        Where the column and row of the point's pixel are.
     unit : float
         Metres per unit of the coordinates.
     unit_from : str or None
@@ -50,6 +54,7 @@ class Layout:
     fortran: bool
     columns: tuple[int, ...] | None
     label: int | None = None
+    pixel: tuple[int, int] | None = None
     unit: float = 1.0
     unit_from: str | None = None
     whole: bool = False
@@ -105,8 +110,9 @@ def _with_columns(name: str, known: Layout, before: Sequence[str], table: list[l
         if (named := _named(heading)) is not None:
             columns, unit = named
             label = next((i for i, key in enumerate(heading) if key in LABEL_NAMES), None)
+            pixel = (heading.index("i"), heading.index("j")) if set(_PIXEL) <= set(heading) else None
             origin = None if unit is None else "column names"
-            return replace(known, columns=columns, label=label, unit=unit or 1.0, unit_from=origin)
+            return replace(known, columns=columns, label=label, pixel=pixel, unit=unit or 1.0, unit_from=origin)
     for heading, line in zip(headings, reversed(before), strict=True):
         if len(heading) == len(table[0]) and not line.lstrip().startswith(_COMMENTS):
             raise InputError(f"{name}: no columns x, y and z among {', '.join(heading)}; name them so")

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,25 +24,60 @@ _FORMATS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _LONGEST_HEADER = 65_536
 
 
+@dataclass(frozen=True)
+class ListKind:
+    """Types of a list property: of its length, and of its entries."""
+
+    length: str
+    entry: str
+
+    def step(self, order: str) -> Callable[[bytes, int], int]:
+        """What goes from the start of such a list to its end."""
+        length, entry = np.dtype(self.length), np.dtype(self.entry).itemsize
+        size, signed = length.itemsize, length.kind == "i"
+        byte_order: Literal["little", "big"] = "big" if order == ">" else "little"
+
+        def over(data: bytes, at: int) -> int:
+            count = int.from_bytes(data[at : at + size], byte_order, signed=signed)
+            return at + size + max(0, count) * entry
+
+        return over
+
+
+def _skip(size: int) -> Callable[[bytes, int], int]:
+    return lambda data, at: at + size
+
+
 @dataclass
 class Element:
-    """One element of the header: its name, how many, and its properties as (name, dtype); a list has dtype None."""
+    """One element of the header: its name, how many, and its properties with their dtype, or that of a list."""
 
     name: str
     count: int
-    properties: list[tuple[str, str | None]] = field(default_factory=list)
+    properties: list[tuple[str, str | ListKind]] = field(default_factory=list)
 
     def dtype(self, name: str, order: str) -> np.dtype[Any]:
         """Layout of one entry in a binary file; refuses lists, whose size only reading tells."""
-        lists = [key for key, kind in self.properties if kind is None]
+        lists = [key for key, kind in self.properties if isinstance(kind, ListKind)]
         if lists:
-            raise InputError(
-                f"{name}: element '{self.name}' has the list '{lists[0]}'; export the points alone, no faces before"
-            )
+            raise InputError(f"{name}: element '{self.name}' has the list '{lists[0]}'; export the points alone")
         try:
             return np.dtype([(key, order + str(kind)) for key, kind in self.properties])
         except ValueError:
             raise InputError(f"{name}: element '{self.name}' names a property twice; export it again") from None
+
+    def end(self, data: bytes, start: int, order: str) -> int:
+        """Where this element ends in a binary file, past its lists one by one; for a cut file, somewhere behind it."""
+        kinds = [kind for _, kind in self.properties]
+        if not any(isinstance(kind, ListKind) for kind in kinds):
+            return start + self.count * sum(np.dtype(kind).itemsize for kind in kinds if isinstance(kind, str))
+        steps = [kind.step(order) if isinstance(kind, ListKind) else _skip(np.dtype(kind).itemsize) for kind in kinds]
+        for _ in range(self.count):
+            for step in steps:
+                start = step(data, start)
+            if start > len(data):
+                break
+        return start
 
 
 @dataclass
@@ -91,8 +127,7 @@ def _take_line(header: Header, sizes: dict[str, int], line: list[str]) -> None:
         case ["element", key, count]:
             header.elements.append(Element(key, _count(count)))
         case ["property", "list", counted, kind, key]:
-            _ = _TYPES[counted], _TYPES[kind]
-            header.elements[-1].properties.append((key, None))
+            header.elements[-1].properties.append((key, ListKind(_TYPES[counted], _TYPES[kind])))
         case ["property", kind, key]:
             header.elements[-1].properties.append((key, _TYPES[kind]))
         case ["obj_info", "num_rows" | "num_cols" as key, count]:
@@ -134,12 +169,10 @@ def _after_lines(data: bytes, start: int, lines: int) -> int:
 
 
 def _binary(name: str, data: bytes, header: Header) -> Columns:
-    offset = header.size
-    for element in header.elements:
-        dtype = element.dtype(name, header.order)
-        if element.name == "vertex":
-            break
-        offset += element.count * dtype.itemsize
+    element, offset = header.vertices, header.size
+    for before in header.elements[: header.elements.index(element)]:
+        offset = before.end(data, offset, header.order)
+    dtype = element.dtype(name, header.order)
     there = max(0, len(data) - offset) // max(1, dtype.itemsize)
     if there < element.count:
         raise InputError(
@@ -159,7 +192,8 @@ class PlySource(CloudSource):
             header = read_header(self.name, file.read(_LONGEST_HEADER))
         self.size = list(reversed(header.grid)) if header.grid else [header.vertices.count]
         kinds = dict(header.vertices.properties)
-        self.dtype = np.dtype(kinds["x"]).name if kinds.get("x") else "unknown"
+        x = kinds.get("x")
+        self.dtype = np.dtype(x).name if isinstance(x, str) else "unknown"
         self.provenance["storage"] = {"": "ascii", "<": "binary", ">": "binary, big-endian"}[header.order]
 
 

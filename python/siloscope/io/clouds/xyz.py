@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from siloscope.errors import InputError
 from siloscope.io.beside import take_camera_beside
-from siloscope.io.clouds.columns import cloud_frame
+from siloscope.io.clouds.columns import by_pixel, cloud_frame
 from siloscope.io.clouds.layout import Layout, is_number, layout
 from siloscope.io.source import Format, FrameSource, Item, Options, check_image_size, read_bytes
 from siloscope.io.terms import UnknownUnit
@@ -26,6 +26,8 @@ _SAMPLE = 200
 
 _LABEL = np.dtype("U20")
 """Room for a label: more than a whole number needs, and bounded, since every row takes as much."""
+
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 _FORTRAN = re.compile(rb"(\d\.?)[dD]([+-]?\d)")
 
@@ -73,14 +75,26 @@ class TableSource(FrameSource):
             )
         columns = {axis: table[:, i] * self.layout.unit for i, axis in enumerate("xyz")}
         frame = cloud_frame(self.name, columns, None)
+        if self.layout.pixel is not None:
+            return by_pixel(frame, _numbers(self.name, self._text, self.layout, self.layout.pixel))
         return replace(frame, labels=_labels(self.name, self._text, self.layout, len(table)))
 
 
 def _text(path: Path) -> bytes:
-    text = read_bytes(path).removeprefix(b"\xef\xbb\xbf")
+    text = _utf_8(path, read_bytes(path)).removeprefix(b"\xef\xbb\xbf")
     if b"\0" in text:
         raise InputError(f"{path}: bytes that are no text among the numbers; the file is damaged, export it again")
     return text.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+
+
+def _utf_8(path: Path, text: bytes) -> bytes:
+    """The text as spreadsheets and Windows shells write it, in UTF-16, as UTF-8; other texts as they are."""
+    if not text.startswith(_UTF_16):
+        return text
+    try:
+        return text.decode("utf-16").encode("utf-8")
+    except UnicodeError as error:
+        raise InputError(f"{path}: damaged UTF-16 text ({error}); save it as UTF-8") from None
 
 
 def _sample(text: bytes) -> list[str]:
@@ -145,6 +159,8 @@ def _label(word: str) -> int:
 
 
 def _sniff(head: bytes, path: Path) -> bool:
+    if head.startswith(_UTF_16):
+        head = head[: len(head) // 2 * 2].decode("utf-16", "replace").encode("utf-8")
     if b"\0" in head:
         return False
     lines = head.decode("latin-1").splitlines()

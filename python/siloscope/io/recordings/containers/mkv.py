@@ -175,8 +175,8 @@ class MkvSource(RecordedSource):
     def __init__(self, path: Path, options: Options) -> None:
         recording = Mkv(path)
         try:
-            super().__init__(path, "mkv", options, recording, _streams_of(recording))
             self.mkv = recording
+            super().__init__(path, "mkv", options, recording, _streams_of(recording))
             self.file_depth_unit = 0.001
             self.provenance.update(_device(recording))
             self.timestamps = [self._time(entry) for entry in self.stream.topic.entries]
