@@ -13,7 +13,7 @@ export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
 .PHONY: help setup build build-dev demo test check style lint types deny rustdoc rust-test python-test coverage bench golden \
-	golden-renew docs images dist requirements hooks release format clean
+	golden-renew fuzz docs images dist requirements hooks release format clean
 
 help: ## shows this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -77,6 +77,9 @@ golden: build ## compares about 400 answers with the ones kept in tests/golden, 
 
 golden-renew: build ## keeps today's answers: only where a commit changes them on purpose
 	$(BIN)/python tests/golden/golden.py --renew
+
+fuzz: build ## mutates a good file of every format 10,000 times; over an hour
+	$(BIN)/python -m tests.fuzz_frames --count 10000
 
 bench: build ## times every step of locate, a PNG decode beside it
 	$(BIN)/python benchmarks/locate.py
