@@ -191,6 +191,17 @@ def test_info_tells_the_first_frame_in_numbers(tmp_path: Path, capsys: pytest.Ca
     assert f"{100 * np.mean(RAW == 0):.1f} % without measurement" in shown
 
 
+def test_a_size_that_can_not_be_is_not_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "cloud.ply"
+    head = "ply\nformat binary_little_endian 1.0\nelement vertex 900000000\n"
+    path.write_bytes((head + "".join(f"property float {axis}\n" for axis in "xyz") + "end_header\n").encode() + b"1234")
+    assert main(["info", str(path)]) == 0
+    shown = capsys.readouterr().out
+    assert "size unknown" in shown
+    assert "can't be read" in shown
+    assert "the header declares 900000000 vertices but the file holds 0" in shown
+
+
 DEPTH = ("/depth", "foxglove.RawImage", foxglove.raw_image(RAW))
 BAD: dict[str, tuple[bytes, str]] = {
     "no schema": (foxglove.mcap([DEPTH], described=b""), "does not describe its messages 'foxglove.RawImage'"),

@@ -33,7 +33,7 @@ def info(
     """
     with _opened(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
         read = sum(1 for _ in track(source, "reading")) if check else None
-        document = source.describe() | {"first_frame": look(source)} | ({"read": read} if check else {})
+        document = _described(source) | ({"read": read} if check else {})
     if as_json:
         print_json(document)
     else:
@@ -47,6 +47,15 @@ def _opened(file: Path, **options: Any) -> FrameSource:
         return siloscope.open(file, **options)
     except NothingToRead as nothing:
         return nothing.source
+
+
+def _described(source: FrameSource) -> dict[str, Any]:
+    """The source's description with its first frame; where none is readable, sizes are only declared, and left out."""
+    document, first = source.describe(), look(source)
+    if first and "error" in first:
+        document["streams"] = [{**stream, "size": None} for stream in document["streams"]]
+        document["problems"] = list(dict.fromkeys([*document["problems"], first["error"]]))
+    return document | {"first_frame": first}
 
 
 def print_description(document: dict[str, Any]) -> None:
@@ -101,8 +110,8 @@ def _topic(topic: dict[str, Any]) -> str:
 
 
 def _first_frame(numbers: dict[str, Any] | None) -> str:
-    if numbers is None:
-        return ""
+    if numbers is None or "error" in numbers:
+        return "" if numbers is None else "can't be read"
     invalid = f"{100 * numbers['invalid']:.1f} % without measurement"
     if extent := numbers.get("extent"):
         sides = ", ".join(f"{axis} {least:.3f} to {most:.3f}" for axis, (least, most) in extent.items())

@@ -17,19 +17,20 @@ _NO_MEASUREMENT = 65535
 
 
 def look(source: FrameSource) -> dict[str, Any] | None:
-    """What the first readable frame holds, as plain data; None where there is none.
+    """What the first readable frame holds, as plain data; None where there is none to be read.
 
     ``invalid`` is the fraction of pixels or points without measurement. A depth image has ``depth``: ``least``,
     ``median`` and ``most`` in ``unit`` (``m``, or ``raw`` where no unit is known). Points have ``extent``: least and
-    most of x, y and z in metres.
+    most of x, y and z in metres. Where no frame can be read, ``error`` says why the first one can't.
     """
+    why: str | None = None
     for item in _before_damage(source):
         try:
             with np.errstate(all="ignore"):
                 return _numbers(source._completed(item), source.depth_unit)
-        except InputError:
-            continue
-    return None
+        except InputError as error:
+            why = why or str(error)
+    return {"error": why} if why else None
 
 
 def _before_damage(source: FrameSource) -> Iterator[Item]:

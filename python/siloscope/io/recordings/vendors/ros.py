@@ -16,7 +16,7 @@ from siloscope.io.recordings.messages import CAMERAS, CLOUDS, COMPRESSED, IMAGES
 from siloscope.io.recordings.recorded import RecordedSource
 from siloscope.io.recordings.recording import Entry, Recording, Topic, or_none
 from siloscope.io.recordings.streams import Stream
-from siloscope.io.source import Options
+from siloscope.io.source import Options, check_image_size
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
 
@@ -93,6 +93,7 @@ def stream_of(recording: Recording, topic: Topic) -> Stream:
         return _compressed_stream(topic, messages.compressed(recording, topic, entry))
     image = messages.image(recording, topic, entry)
     _check_depth(topic, image.encoding)
+    check_image_size("the image", image.width, image.height)
     kind = "float32" if image.encoding == "32FC1" else "uint16"
     return Stream(topic.name, "depth", topic, (image.width, image.height), kind)
 
