@@ -13,6 +13,9 @@ from siloscope.types.depth_frame import DepthFrame
 _Doubles: TypeAlias = NDArray[np.float64]
 
 __version__: str
+PARAMETERS: tuple[str, ...]
+STEP_DEFAULTS: tuple[float, int, float, float, int]
+"""Grid, neighbours, share, agreement and partners of the six steps."""
 
 def camera_rays(camera: Any) -> NDArray[np.float64]: ...
 def check_camera(camera: Any) -> None: ...

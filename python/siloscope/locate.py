@@ -15,6 +15,7 @@ from siloscope.errors import UsageError
 from siloscope.estimation import shape_tensor, surface
 from siloscope.estimation.inputs import Prepared, PreparedDepth, PreparedPoints, prepare
 from siloscope.estimation.priors import CLOUD, Priors
+from siloscope.estimation.steps import NEIGHBOURS
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import Camera, is_number
 from siloscope.types.estimate import Estimate
@@ -49,7 +50,7 @@ def locate(
     mask: ArrayLike | None = None,
     crop: Sequence[float] | None = None,
     grid: Number = None,
-    neighbours: int = 30,
+    neighbours: int = NEIGHBOURS,
     threads: int = 1,
     start: Estimate | None = None,
     ratios: bool = True,

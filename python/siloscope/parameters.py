@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import math
 
-PARAMETERS = (
-    *("r_x", "r_y", "t_x", "t_y", "radius", "cone_slope", "cone_intercept"),
-    *("offset", "scale", "quadratic", "oval_cos", "oval_sin"),
-)
+from siloscope import _core
+
+PARAMETERS = _core.PARAMETERS
 """Order of the parameters: pose; radius; cone (its radius b − m·z: slope m, intercept b); depth bias; ovality."""
 
 SIZE = len(PARAMETERS)

@@ -24,20 +24,10 @@ Numbers = NDArray[np.float64]
 Indices = NDArray[np.uint32]
 Result = TypeVar("Result")
 
-GRID = 0.05
-"""Side of the voxels, m (step 1)."""
-
-NEIGHBOURS = 30
-"""Neighbours k of normals and shape tensors (step 2)."""
-
-SHARE = 0.7
-"""Share of the clearly curved points that are kept as candidates (step 3)."""
-
-AGREEMENT = 2.0
-"""Robust standard deviations by which a candidate's E1 may be off the perpendicular to X (step 4)."""
-
-PARTNERS = 100
-"""Partners s of each candidate (step 5)."""
+GRID, NEIGHBOURS, SHARE, AGREEMENT, PARTNERS = _core.STEP_DEFAULTS
+"""Defaults: side of the voxels, m (step 1); neighbours k of normals and shape tensors (step 2); fraction of the clearly
+curved points that are kept as candidates (step 3); robust standard deviations by which a candidate's E1 may be off the
+perpendicular to X (step 4); partners s of each candidate (step 5)."""
 
 VIEWS = ("inside", "outside", "either")
 """From which side walls are seen; "either" is for scans from several places."""
