@@ -134,8 +134,9 @@ def test_two_depth_topics_ask_which(tmp_path: Path, capsys: pytest.CaptureFixtur
     assert only_frame(path, stream="aligned").provenance["stream"] == topics[1]
 
 
-def test_infrared_is_not_depth(tmp_path: Path) -> None:
-    path = write(tmp_path, "ros1", [("/camera/infra1/image_rect_raw", START_NS, Maker(1).image(RAW, "16UC1"))])
+@pytest.mark.parametrize("topic", ["/camera/infra1/image_rect_raw", "/kinect2/sd/image_ir", "/cam/left_infrared"])
+def test_infrared_is_not_depth(tmp_path: Path, topic: str) -> None:
+    path = write(tmp_path, "ros1", [(topic, START_NS, Maker(1).image(RAW, "16UC1"))])
     with pytest.raises(InputError, match="no depth and no points"):
         siloscope.open(path)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from siloscope.errors import InputError
@@ -20,7 +21,8 @@ NAMES = (
 
 def camera_file_beside(folder: Path) -> Path | None:
     """The camera file in a folder; raises `InputError` where several say different things."""
-    found = [folder / name for name in NAMES if (folder / name).is_file()]
+    paths = (os.path.join(folder, name) for name in NAMES)  # a Path for each would take longer than a small frame
+    found = [Path(path) for path in paths if os.path.isfile(path)]
     if not found:
         return None
     if len({camera_files.read(path) for path in found}) > 1:

@@ -6,6 +6,7 @@ import io
 import math
 import warnings
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import IO, Any
 
 import numpy as np
@@ -90,16 +91,26 @@ def stored_array(file: IO[bytes], name: str, size: int, *, text: bool = False) -
 def _header(file: IO[bytes], name: str) -> tuple[tuple[int, ...], bool, np.dtype[Any], int]:
     """Shape, whether in Fortran's order, type, and where the values start."""
     try:
-        head = io.BytesIO(file.read(_LONGEST_HEADER))
+        start = file.read(_LONGEST_HEADER)
     except Exception as error:  # as above
         raise InputError(f"{name}: can't be decompressed ({error}); save it again") from None
+    first = 10 if start[6:7] == b"\x01" else 12
+    offset = first + int.from_bytes(start[8:first], "little")
     try:
-        old = layout.read_magic(head) == (1, 0)
-        read = layout.read_array_header_1_0 if old else layout.read_array_header_2_0
-        with warnings.catch_warnings(action="ignore"):
-            return *read(head, max_header_size=_LONGEST_HEADER), head.tell()
+        return *_parsed(start[:offset]), offset
     except Exception:  # the header is a Python literal: damage fails in the tokenizer, the parser or the type's name
         raise _damaged(name) from None
+
+
+@lru_cache(maxsize=64)
+def _parsed(header: bytes) -> tuple[tuple[int, ...], bool, np.dtype[Any]]:
+    """What NumPy reads in a header; the frames of a folder have the same one."""
+    file = io.BytesIO(header)
+    old = layout.read_magic(file) == (1, 0)
+    read = layout.read_array_header_1_0 if old else layout.read_array_header_2_0
+    with warnings.catch_warnings(action="ignore"):
+        shape, fortran, dtype = read(file, max_header_size=_LONGEST_HEADER)
+    return shape, fortran, dtype
 
 
 def _damaged(name: str) -> InputError:

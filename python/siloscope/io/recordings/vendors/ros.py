@@ -20,7 +20,7 @@ from siloscope.io.source import Options, check_image_size
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
 
-_INFRARED = re.compile(r"/(ir|infra)", re.IGNORECASE)
+_INFRARED = re.compile(r"/(ir|infra)|_ir(?![a-z])|_infra", re.IGNORECASE)
 _MILLIMETRES = 0.001
 """Unit of 16UC1 depth in ROS (REP 118)."""
 
