@@ -85,7 +85,9 @@ def calibrated(scene: Scene, known: Knowledge) -> siloscope.Calibration:
     """What five frames of an earlier discharge tell."""
     earlier = [replace(scene, feed=Feed("gaussian", at), seed=scene.seed + 100 + i) for i, at in enumerate(EARLIER)]
     diameter = 2.0 * scene.silo.radius if known.diameter else None
-    return siloscope.calibrate([s.render().frame() for s in earlier], sensor=known.profile, diameter=diameter)
+    return siloscope.calibrate(
+        [s.render().frame() for s in earlier], sensor=known.profile, diameter=diameter, bottom="cone"
+    )
 
 
 def content(scene: Scene, shape: str, level: float, draw: np.random.Generator) -> Scene:

@@ -41,7 +41,9 @@ def main() -> None:
     IMAGES.mkdir(exist_ok=True)
     for name in SHOWN:
         save(name, drawn[name])
-    calibration = siloscope.calibrate([frame("gaussian", at, i) for i, at in enumerate((0.5, 0.3, 0.1))], sensor=SENSOR)
+    calibration = siloscope.calibrate(
+        [frame("gaussian", at, i) for i, at in enumerate((0.5, 0.3, 0.1))], sensor=SENSOR, bottom="cone"
+    )
     measured = siloscope.measure(frame("mound+tilted+lumpy", 0.62, 7), calibration)
     for name in ("height-map", "surface"):
         save(name, content_pictures(measured)[name])

@@ -23,7 +23,9 @@ def frames(levels: tuple[float, ...], shape: str) -> list[siloscope.Frame]:
 
 def main() -> None:
     """Prints one reading with its deviation, and the story of a morning."""
-    calibration = siloscope.calibrate(frames((0.5, 0.4, 0.3, 0.2, 0.1), "gaussian"), sensor="orbbec-astra-s")
+    calibration = siloscope.calibrate(
+        frames((0.5, 0.4, 0.3, 0.2, 0.1), "gaussian"), sensor="orbbec-astra-s", bottom="cone"
+    )
     morning = frames(LEVELS, "funnel")
     content = siloscope.measure(morning[0], calibration, product="wheat")
     if content.volume is None:

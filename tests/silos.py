@@ -12,6 +12,7 @@ from siloscope import sensors
 from siloscope.simulation import ASTRA_S, PERFECT, Feed, Scene, SensorModel, Silo
 from siloscope.simulation.scenarios import looking_at
 from siloscope.types.camera import Camera
+from siloscope.types.floor import Floor
 
 SMALL = Camera(width=320, height=240, fx=285.15, fy=285.15, cx=159.5, cy=119.5)
 """The Astra at half its resolution: quicker to render."""
@@ -31,7 +32,10 @@ def scene(
 
 
 def known(scene: Scene, std: float = 0.0) -> siloscope.Calibration:
-    """A calibration with the scene's true pose, slope and lengths, and a standard deviation for all of them."""
+    """A calibration with the scene's true pose, slope and lengths, and a standard deviation for all of them.
+
+    It was told that its cone is the bottom: most cones of these tests lie no steeper than feed may.
+    """
     g, pose = scene.silo.geometry, scene.pose
     slope = g.radius / (g.apex - g.cylinder_bottom)
     values = [pose.r_x, pose.r_y, pose.t_x, pose.t_y, g.radius, slope, slope * g.apex, *scene.sensor.bias, 0.0, 0.0]
@@ -47,6 +51,7 @@ def known(scene: Scene, std: float = 0.0) -> siloscope.Calibration:
         parameters=np.array(values),
         parameter_covariance=covariance,
         config={"sensor": quiet() if name is None else sensors.load(name).to_dict()},
+        floor=Floor("cone", "told"),
     )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from siloscope.errors import InputError, UsageError
 from siloscope.reasons import CONTENT_REMARKS
 from siloscope.simulation import ASTRA_S, PERFECT, Defects, Feed, Silo, defects
 from siloscope.simulation.scenarios import random_scene
+from siloscope.types.floor import Floor
 
 PLACES = [(0.0, 0.0), (0.4, 0.2), (-0.8, 0.3), (0.2, -0.9)]
 
@@ -105,7 +107,7 @@ class TestLaws:
 
     def test_a_calibrations_lengths_are_as_sure_as_it_says(self) -> None:
         frames = [noisy(scene(Feed("gaussian", level)), seed).render() for seed, level in enumerate((0.35, 0.3, 0.25))]
-        calibration = siloscope.calibrate([frame.frame() for frame in frames], sensor="orbbec-astra-s")
+        calibration = siloscope.calibrate([frame.frame() for frame in frames], sensor="orbbec-astra-s", bottom="cone")
         std = calibration.silo_std
         found = np.sqrt(np.diag(know(calibration, None, Datasheet(), None, None).covariance))
         assert found[4:7] == pytest.approx([std.radius, std.cylinder_bottom, std.apex])
@@ -271,11 +273,13 @@ class TestTruth:
         assert calibration.parameters is not None
         values = calibration.parameters.copy()
         values[5:7] = np.nan
-        blind = replace(calibration, parameters=values, silo=siloscope.SiloGeometry(radius=calibration.silo.radius))
+        seen = siloscope.SiloGeometry(radius=calibration.silo.radius)
+        blind = replace(calibration, parameters=values, silo=seen, floor=Floor())
         content = siloscope.measure(made.render().frame(), blind)
         assert content.ok
         assert content.volume is None
-        assert content.missing == ("cylinder_bottom", "apex")
+        assert content.missing == ("bottom",)
+        assert "--empty" in (content.message or "")
         assert content.height_datum == "lowest-seen"
         assert content.level.mean == pytest.approx(0.0, abs=5e-3)
         full = siloscope.measure(made.render().frame(), blind, cylinder=2.5, cone=1.2, top=0.0)
@@ -285,7 +289,7 @@ class TestTruth:
 
     def test_without_a_calibration_the_frame_itself_must_do(self) -> None:
         shown = noisy(scene(Feed("gaussian", 0.3))).render()
-        content = siloscope.measure(shown.frame(), sensor="orbbec-astra-s")
+        content = siloscope.measure(shown.frame(), sensor="orbbec-astra-s", bottom="cone")
         assert content.ok, content.message
         assert abs(percent(content, shown)) < 0.3
         assert "without a calibration" in content.assumed[0]
@@ -413,7 +417,7 @@ def _other_silo() -> siloscope.Content:
     return siloscope.measure(made.render().frame(), known(short))
 
 
-CASES = {
+CASES: dict[str, Callable[[], siloscope.Content]] = {
     "too-little-seen": _nothing,
     "partly-seen": _partly,
     "sensor-buried": _buried,
@@ -427,6 +431,8 @@ CASES = {
     "filling-in-progress": _filling,
     "camera-moved": _moved_camera,
     "below-the-floor": _other_silo,
+    "bottom-unknown": lambda: measured(scene(Feed("mound", 0.4)), bottom="unknown")[0],
+    "vessel-contradicted": lambda: measured(scene(Feed("mound", 0.4)), diameter=2.6)[0],
 }
 
 
@@ -438,6 +444,7 @@ class TestQuality:
         remark = next(r for r in content.quality if r.code == code)
         assert remark.message == CONTENT_REMARKS[code][0]
         assert remark.to_dict()["advice"]
+        assert remark.severity in ("note", "warning", "refusal")
         if remark.refuses:
             assert content.status == "refused"
             assert content.volume is None
@@ -486,7 +493,9 @@ class TestDisasters:
             {"product": "gravel-of-mars"},
             {"density_std": 5.0},
             {"diameter": 0.0},
-            {"diameter": 2.6},
+            {"diameter": 3.0},
+            {"bottom": "round"},
+            {"bottom": "flat", "cone": 1.0},
             {"cone": -1.0},
             {"outlet_diameter": 100.0},
             {"sensor": "orbbec-astra-s"},

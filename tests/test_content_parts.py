@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -142,7 +143,13 @@ class TestCapacity:
             Strapping.read(file)
 
     def test_lengths_that_can_not_be(self) -> None:
-        for bad in ({"diameter": math.nan}, {"cylinder": -1.0}, {"cone": 1e6}, {"outlet_length": -0.1}):
+        bads: tuple[dict[str, Any], ...] = (
+            {"diameter": math.nan},
+            {"cylinder": -1.0},
+            {"cone": 1e6},
+            {"outlet_length": -0.1},
+        )
+        for bad in bads:
             with pytest.raises(UsageError):
                 Datasheet(**bad)
 

@@ -92,6 +92,12 @@ def sensors() -> str:
     return "\n".join(["| name | where its figures come from |", "|---|---|", *rows])
 
 
+def bottom_evidence() -> str:
+    """How a bottom is known."""
+    rows = [f"| `{name}` | {meaning} |" for name, meaning in reasons.BOTTOM_EVIDENCE.items()]
+    return "\n".join(("| evidence | the bottom is known from |", "|---|---|", *rows))
+
+
 def content_quality() -> str:
     """Every remark on a reading of the content."""
     from siloscope.reasons import CONTENT_REFUSALS, CONTENT_REMARKS
@@ -112,5 +118,10 @@ def products() -> str:
 
 
 _PARTS: dict[str, Callable[[], str]] = {"commands": commands, "reasons": reasons, "sensors": sensors}
-_PARTS |= {"quality": quality, "calibration_reasons": calibration_reasons, "frame_statuses": frame_statuses}
+_PARTS |= {
+    "bottom_evidence": bottom_evidence,
+    "quality": quality,
+    "calibration_reasons": calibration_reasons,
+    "frame_statuses": frame_statuses,
+}
 _PARTS |= {"content_quality": content_quality, "products": products}

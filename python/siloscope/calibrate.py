@@ -11,6 +11,7 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
+from siloscope.content.floor import calibrated_floor
 from siloscope.errors import UsageError
 from siloscope.fusion.history import History
 from siloscope.fusion.report import calibration_of
@@ -40,6 +41,7 @@ def calibrate(
     depth_unit: float | None = None,
     diameter: float | None = None,
     gravity: ArrayLike | None = None,
+    bottom: str | None = None,
     continue_from: Calibration | Pathlike | None = None,
     rule: str = "information",
     jobs: int = 1,
@@ -57,6 +59,9 @@ def calibrate(
         A path or several, what `siloscope.open` gives, frames, arrays, or answers of `locate` (method surface).
     camera, sensor, depth_unit, diameter, gravity
         As for `locate`. Estimates bring their own.
+    bottom : str, optional
+        "cone": the conical surface of these frames is the vessel's bottom; "flat"; "unknown". Without it a surface
+        counts as the bottom only if it is steeper than feed can lie.
     continue_from : Calibration or path, optional
         An earlier calibration of the same camera and silo; its frames come before these.
     rule : str
@@ -99,4 +104,4 @@ def calibrate(
     config["camera"] = common_camera(before, answers)
     found = calibration_of(History.of(before).extended(answers, lost), rule, config)
     times = {"frames": 1e3 * (read_until - start), "fusion": 1e3 * (time.perf_counter() - read_until)}
-    return replace(found, timing_ms=times)
+    return replace(found, timing_ms=times, floor=calibrated_floor(found, bottom, before))

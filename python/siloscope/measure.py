@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from siloscope import _core, sensors
 from siloscope.calibrate import calibrate
 from siloscope.content.capacity import LONGEST, Datasheet, Strapping
-from siloscope.content.density import Density, choose
+from siloscope.content.density import STEEPEST_REPOSE, Density, choose
 from siloscope.content.knowledge import WALL_STD, Knowledge, know, narrowed
 from siloscope.content.reading import Request, content_of, lengths_for_core, source_of
 from siloscope.errors import InputError, UsageError
@@ -41,6 +41,7 @@ def measure(
     diameter: float | None = None,
     cylinder: float | None = None,
     cone: float | None = None,
+    bottom: str | None = None,
     top: float | None = None,
     outlet_diameter: float = 0.0,
     outlet_length: float = 0.0,
@@ -69,9 +70,12 @@ def measure(
     depth_unit : float, optional
         Metres per raw unit of integer depth.
     diameter, cylinder, cone : float, optional
-        Inner lengths of a datasheet, m: diameter, height of the cylinder, height of the cone. They fill in what the
-        calibration has not seen and tell the silo's upper edge. Without a calibration, the diameter also fixes the
-        depth's scale.
+        Inner lengths of a datasheet, m: diameter, height of the cylinder, height of the cone, 0 for a flat floor. They
+        fill in what the calibration has not seen and tell the silo's upper edge. Without a calibration, the diameter
+        also fixes the depth's scale.
+    bottom : str, optional
+        "cone" (the conical surface seen is the bottom, where `cone` is not given), "flat", or "unknown". Without it a
+        conical surface counts as the bottom only if it is steeper than feed can lie.
     top : float, optional
         z of the silo's upper edge below the camera, m (negative above it), up to which it can be filled. From
         `cylinder` where not given, else the camera's own height.
@@ -99,10 +103,11 @@ def measure(
     chosen = choose(density, density_std, product)
     if top is not None and not abs(top) <= LONGEST:
         raise UsageError(f"top must be between -{LONGEST:g} and {LONGEST:g} m, got {top}")
-    sheet = Datasheet(diameter, cylinder, cone, outlet_diameter, outlet_length)
+    sheet = Datasheet(diameter, cylinder, cone, outlet_diameter, outlet_length, bottom)
     table = strapping if isinstance(strapping, Strapping | None) else Strapping.read(strapping)
     profile = None if sensor is None else sensors.load(sensor)
-    known, located = _known(data, calibration, camera, profile, depth_unit, sheet, top, mask)
+    steepest = STEEPEST_REPOSE if chosen is None else chosen.steepest
+    known, located = _known(data, calibration, camera, profile, depth_unit, sheet, top, mask, steepest)
     if isinstance(known, Content):
         return known
     prepared = prepare(data, _camera(data, camera, located), profile or sensors.UNKNOWN,
@@ -126,11 +131,12 @@ def _known(
     sheet: Datasheet,
     top: float | None,
     mask: ArrayLike | None,
+    steepest: float,
 ) -> tuple[Knowledge | Content, Calibration]:
     """Pose and silo: from the calibration, or from the frame itself."""
     if calibration is not None:
         given = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
-        return know(given, profile, sheet, top, sheet.diameter), given
+        return know(given, profile, sheet, top, sheet.diameter, steepest), given
     estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask)
     if not estimate.ok:
         reason, message = estimate.reason, f"{estimate.message} A calibration (--calibration) would do without."
@@ -138,7 +144,7 @@ def _known(
             "refused"
         )
     fused = calibrate([estimate], sensor=profile, diameter=sheet.diameter)
-    known = know(fused, profile, sheet, top, None)
+    known = know(fused, profile, sheet, top, None, steepest)
     said = ("pose and silo from this frame alone, without a calibration", *known.assumed)
     return replace(known, assumed=said), fused
 

@@ -85,12 +85,39 @@ CONTENT_REMARKS: dict[str, tuple[str, str]] = {
         "the wall no longer lies where the calibration has it",
         "calibrate anew with frames taken since the camera was moved",
     ),
+    "bottom-unknown": (
+        "there is no volume: what lies under the surface is not known",
+        "say what the bottom is (--bottom, --cone, --vessel) or calibrate with frames of the empty vessel (--empty)",
+    ),
+    "vessel-contradicted": (
+        "what was given of the vessel contradicts what is seen",
+        "check the numbers that were given, and whether the frames are of this vessel",
+    ),
     "below-the-floor": (
         "much of what is seen lies below the silo's floor",
         "check that calibration and frame are of one silo and one camera",
     ),
 }
 """Code: what it means, what to do."""
+
+
+BOTTOM_KINDS = ("cone", "flat", "oblique", "two-stage", "pyramid", "wedge", "map", "unknown")
+"""Kinds of bottom. A map is a floor as it was seen, whatever its shape."""
+
+
+BOTTOM_EVIDENCE = {
+    "datasheet": "lengths that were given",
+    "told": "the user says that the conical surface seen is the bottom",
+    "tare": "frames of the empty vessel",
+    "steep": "the surface seen is steeper than feed can lie",
+    "unchanged": "the surface seen was in the same place before and after a fill and a draw-down",
+    "discharge": "the lowest surface seen at each place of a discharge that a refill confirmed",
+}
+"""How a bottom is known."""
+
+
+CONTENT_NOTES = ("partly-seen", "bottom-unknown", "filling-in-progress")
+"""Codes that only inform; the others warn."""
 
 
 CONTENT_REFUSALS = ("too-little-seen", "sensor-buried", "camera-moved", "below-the-floor")

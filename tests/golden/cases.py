@@ -247,7 +247,7 @@ def calibrated_worn(seed: int) -> Results:
 def contents(seed: int) -> Results:
     """A silo calibrated from an earlier discharge, then feed of every shape."""
     scene = small(random_scene(seed, sensor=ASTRA_S))
-    silo = siloscope.calibrate(sequence(scene, 0.7, 5), sensor=SENSOR)
+    silo = siloscope.calibrate(sequence(scene, 0.7, 5), sensor=SENSOR, bottom="cone")
     found: Results = {"calibration": silo}
     if not silo.ok:
         return found
@@ -297,7 +297,7 @@ def refused(seed: int) -> Results:
 def story(seed: int) -> Results:
     """A discharge, a refill and another discharge."""
     scene = small(random_scene(seed, sensor=ASTRA_S))
-    silo = siloscope.calibrate(sequence(scene, 0.6, 6), sensor=SENSOR)
+    silo = siloscope.calibrate(sequence(scene, 0.6, 6), sensor=SENSOR, bottom="cone")
     levels = (0.5, 0.45, 0.38, 0.38, 0.31, 0.7, 0.7, 0.62, 0.55, 0.55, 0.47, 0.4)
     scenes = [replace(scene, feed=Feed("funnel", level), seed=seed + i) for i, level in enumerate(levels)]
     taken = [replace(s.render().frame(), timestamp=1.7e9 + 21_600.0 * i) for i, s in enumerate(scenes)]

@@ -13,7 +13,7 @@ import siloscope
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, REFUSED, check_place, print_json, writing
 from siloscope.cli.progress import say, track
-from siloscope.cli.summary import headline, pose_table, silo_line, tilt_line
+from siloscope.cli.summary import floor_line, headline, pose_table, silo_line, tilt_line
 from siloscope.io import FrameSource
 from siloscope.reasons import CALIBRATION_REMARKS
 from siloscope.types.calibration import Calibration
@@ -27,6 +27,7 @@ def calibrate(
     depth_unit: options.DepthUnit = None,
     diameter: options.Diameter = None,
     gravity: options.Gravity = None,
+    bottom: options.Bottom = None,
     earlier: Annotated[
         Path | None, typer.Option("--continue", metavar="FILE", help="An earlier calibration to go on with.")
     ] = None,
@@ -52,6 +53,7 @@ def calibrate(
             sensor=sensor,
             diameter=diameter,
             gravity=down,
+            bottom=bottom,
             continue_from=earlier,
             rule=rule,
             jobs=jobs or os.cpu_count() or 1,
@@ -96,6 +98,7 @@ def _print(found: Calibration, out: Path) -> None:
     console.print(pose_table(found))
     for line in (tilt_line(found), silo_line(found.silo, found.silo_std)):
         console.print(line, markup=False)
+    console.print(floor_line(found.floor), markup=False)
     for code in found.quality:
         say(f"{code}: {CALIBRATION_REMARKS[code]}{_when(found) if code == 'camera-moved' else ''}")
 

@@ -42,7 +42,7 @@ Product = Annotated[
 ]
 
 
-SETTINGS = ("sensor", "diameter", "cylinder", "cone", "top", "outlet_diameter", "outlet_length", "strapping",
+SETTINGS = ("sensor", "diameter", "cylinder", "cone", "bottom", "top", "outlet_diameter", "outlet_length", "strapping",
             "density", "density_std", "product")  # fmt: skip
 """Options that the library takes under the same names."""
 
@@ -61,6 +61,7 @@ def measure(
     diameter: options.Diameter = None,
     cylinder: Cylinder = None,
     cone: Cone = None,
+    bottom: options.Bottom = None,
     top: Top = None,
     outlet_diameter: OutletDiameter = 0.0,
     outlet_length: OutletLength = 0.0,
@@ -135,19 +136,37 @@ def print_content(content: Content) -> None:
     for row in _rows(content):
         table.add_row(*map(escape, row))
     console.print(table)
+    if content.message:
+        say(content.message)
     for line in content.assumed:
         say(f"assumed: {line}")
     for remark in content.quality:
         say(f"{remark.code}: {remark.message} ({remark.seen}); {remark.advice}")
 
 
+DATUM_WORDS = {
+    "cone-vertex": "over the cone's vertex",
+    "floor": "over the floor",
+    "lowest-seen": "over the lowest point seen",
+}
+"""What heights are measured from."""
+
+
+def _edge(content: Content) -> str:
+    """Up to where the ullage counts."""
+    given = content.lengths is not None and content.lengths.top_from != "camera"
+    return "free below the upper edge" if given else "free below the camera's height"
+
+
 def _rows(content: Content) -> list[tuple[str, str, str]]:
     """What a person wants to read, line by line."""
     level = content.level
-    datum = "over the cone's vertex" if content.height_datum == "cone-vertex" else "over the lowest point seen"
+    datum = DATUM_WORDS.get(content.height_datum or "", "")
     rows = [("volume", _volume(content), "")]
+    if content.ullage is not None:
+        rows.append(("ullage", with_std(content.ullage, content.ullage_std, 1.0, " m³"), _edge(content)))
     if content.fill_fraction is not None and content.free is not None:
-        rows.append(("fill", f"{100 * content.fill_fraction:.1f} %", f"{content.free:.2f} m³ free"))
+        rows.append(("fill", f"{100 * content.fill_fraction:.1f} %", f"of {content.capacity:.2f} m³"))
     if content.mass is not None:
         name = (content.density or {}).get("name", "")
         rows.append(("mass", with_std(content.mass, content.mass_std, 1.0, " kg"), name))
@@ -163,5 +182,5 @@ def _rows(content: Content) -> list[tuple[str, str, str]]:
 
 def _volume(content: Content) -> str:
     if content.volume is None:
-        return f"not known; missing {', '.join(content.missing)}"
+        return f"unknown; missing: {', '.join(content.missing)}"
     return with_std(content.volume, content.volume_std, 1.0, " m³")

@@ -27,6 +27,9 @@ Diameter = Annotated[
 Gravity = Annotated[
     str | None, typer.Option("--gravity", metavar="X,Y,Z", help="Gravity in the camera frame, from an accelerometer.")
 ]
+Bottom = Annotated[
+    str | None, typer.Option("--bottom", metavar="KIND", help="cone: the cone seen is the bottom; flat; unknown.")
+]
 Stream = Annotated[str | None, typer.Option("--stream", help="Which depth stream of a recording.")]
 Threads = Annotated[int | None, typer.Option("--threads", min=1, max=256, help="Threads to use; 1 unless given.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else.")]

@@ -8,8 +8,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from siloscope.reasons import BOTTOM_EVIDENCE
 from siloscope.types.calibration import Calibration
 from siloscope.types.estimate import Estimate, Ratios
+from siloscope.types.floor import Floor
 from siloscope.types.vessel import SiloGeometry
 from siloscope.wording import with_std
 
@@ -82,3 +84,11 @@ def ratios_line(ratios: Ratios | None) -> str:
         return ""
     parts = [f"{name} {100 * share:.0f} %" for name, share in ratios.to_dict().items()]
     return "Pixels: " + ", ".join(parts) + "."
+
+
+def floor_line(floor: Floor) -> str:
+    """What is known of the bottom, and how."""
+    if floor.evidence is not None:
+        return f"bottom: {floor.kind} ({BOTTOM_EVIDENCE[floor.evidence]})"
+    seen = "none was seen" if floor.seen is None else f"the conical surface seen ({floor.seen}) may be feed"
+    return f"bottom: unknown, {seen}; --bottom or --empty tells"

@@ -40,6 +40,7 @@ def track(
     diameter: options.Diameter = None,
     cylinder: one.Cylinder = None,
     cone: one.Cone = None,
+    bottom: options.Bottom = None,
     top: one.Top = None,
     outlet_diameter: one.OutletDiameter = 0.0,
     outlet_length: one.OutletLength = 0.0,

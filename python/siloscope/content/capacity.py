@@ -7,6 +7,7 @@ import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -22,6 +23,9 @@ LONGEST = 200.0
 LENGTH_STD = 0.01
 """Standard deviation of a length of a datasheet, m."""
 
+BOTTOMS = ("cone", "flat", "unknown")
+"""Bottoms that an option tells."""
+
 
 @dataclass(frozen=True)
 class Datasheet:
@@ -36,17 +40,23 @@ class Datasheet:
     """Diameter of the outlet pipe; 0 for none."""
     outlet_length: float = 0.0
     """How far the pipe's closed end lies below the cone's vertex."""
+    bottom: str | None = None
+    """"cone", "flat" or "unknown"; None where it is not told."""
 
     def __post_init__(self) -> None:
         for name, least in (("diameter", 0.01), ("cylinder", 0.0), ("cone", 0.0)):
             value = getattr(self, name)
             if value is not None and not least <= value <= LONGEST:
                 raise UsageError(f"{name} must be between {least:g} and {LONGEST:g} m, got {value}")
+        if self.bottom not in (None, *BOTTOMS):
+            raise UsageError(f"bottom '{self.bottom}': give one of {', '.join(BOTTOMS)}")
+        if self.bottom == "flat" and self.cone:
+            raise UsageError(f"a flat bottom has no cone of {self.cone:g} m; give one of the two")
         for name in ("outlet_diameter", "outlet_length"):
             if not 0.0 <= getattr(self, name) <= 20.0:
                 raise UsageError(f"{name.replace('_', '-')} must be between 0 and 20 m, got {getattr(self, name)}")
 
-    def to_dict(self) -> dict[str, float | None]:
+    def to_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
@@ -143,6 +153,8 @@ def complete(seen: SiloGeometry, sheet: Datasheet, top: float | None) -> Lengths
     if apex is None and bottom is not None and sheet.cone is not None:
         apex, variance[2], apex_from = bottom + sheet.cone, own, "bottom"
         assumed.append("cone's vertex from the cylinder's bottom and the datasheet's cone")
+    if sheet.bottom == "flat" and apex is None and bottom is not None:
+        apex, variance[2], apex_from = bottom, 0.0, "bottom"
     edge, source = _top(bottom, sheet, top)
     if source == "camera":
         assumed.append("the silo can be filled up to the camera's height")
@@ -162,3 +174,15 @@ def _top(bottom: float | None, sheet: Datasheet, top: float | None) -> tuple[flo
 def missing(geometry: SiloGeometry) -> tuple[str, ...]:
     """Names of the lengths that a volume needs and nobody knows."""
     return tuple(name for name in ("radius", "cylinder_bottom", "apex") if getattr(geometry, name) is None)
+
+
+def lacking(geometry: SiloGeometry, sheet: Datasheet, top: float | None) -> tuple[str, ...]:
+    """The same in the words of the options: without a joint that was seen, `top` and `cylinder` have to place it."""
+    names = missing(geometry)
+    if "cylinder_bottom" not in names:
+        return tuple("cone" if name == "apex" else name for name in names)
+    placing = (("top", top), ("cylinder", sheet.cylinder))
+    wanted = [name for name, value in placing if value is None]
+    if "apex" in names and sheet.cone is None and sheet.bottom != "flat":
+        wanted.append("cone")
+    return tuple(name for name in names if name == "radius") + tuple(wanted)

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 DENSITIES = (10.0, 10_000.0)
 """Bulk densities that a silo may hold, kg/m³."""
+STEEPEST_REPOSE = math.radians(50.0)
+"""Steepest slope at which feed is found: cohesive meal in the crater of a discharge."""
 STEPS = 400
 """Slices of a column in which the pressure is followed."""
 
@@ -45,12 +47,15 @@ class Density:
     """μ, of the feed on the wall."""
     pressure_ratio: float = 0.5
     """K, horizontal by vertical pressure."""
+    steepest: float = STEEPEST_REPOSE
+    """Steepest slope at which it lies, radians; a steeper surface is no feed."""
 
     def __post_init__(self) -> None:
         _between(f"{self.name}: density", self.loose, *DENSITIES)
         _between(f"{self.name}: density_std", self.std, 0.0, self.loose)
         _between(f"{self.name}: friction", self.friction, 0.0, 2.0)
         _between(f"{self.name}: pressure_ratio", self.pressure_ratio, 0.0, 2.0)
+        _between(f"{self.name}: steepest_repose", math.degrees(self.steepest), 5.0, 89.0)
         pressures = [p for p, _ in self.compaction]
         rising = all(a < b for a, b in itertools.pairwise(pressures))
         if self.compaction and (pressures[0] != 0.0 or not rising):
@@ -89,6 +94,7 @@ class Density:
             "loose_kg_m3": self.loose,
             "std_kg_m3": self.std,
             "source": self.source,
+            "steepest_repose_rad": self.steepest,
             "compaction": [list(entry) for entry in self.compaction],
             "friction": self.friction if self.compaction else None,
             "pressure_ratio": self.pressure_ratio if self.compaction else None,
@@ -150,6 +156,7 @@ def _density(told: ProductFile, name: str) -> Density:
         told.compaction,
         told.friction,
         told.pressure_ratio,
+        STEEPEST_REPOSE if told.steepest_repose is None else math.radians(told.steepest_repose),
     )
 
 

@@ -10,10 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import sensors
-from siloscope.content.capacity import Datasheet, complete
+from siloscope.content.capacity import LENGTH_STD, Datasheet, complete, lacking
+from siloscope.content.density import STEEPEST_REPOSE
+from siloscope.content.floor import CONTRADICTION_STD, floor_of
 from siloscope.errors import InputError, UsageError
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
+from siloscope.types.content import Remark
+from siloscope.types.floor import Floor
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import Lengths, SiloGeometry
 
@@ -22,6 +26,9 @@ PARAMETERS = ("r_x", "r_y", "t_x", "t_y", "radius", "cylinder_bottom", "apex", "
 
 TYPICAL_NOISE = (0.002, 0.0, 0.0, 0.0, 0.0019, 2.36)
 """Noise law where nothing tells the sensor's own: that of a structured-light camera (`orbbec-astra`)."""
+
+ANOTHER_VESSEL = 0.1
+"""Share by which a diameter may differ from the calibration's and still be of the same vessel."""
 
 WALL_STD = 0.002
 """How uneven a wall is that nothing tells more about, m (standard deviation)."""
@@ -44,10 +51,20 @@ class Knowledge:
     """How oval the silo is, as the calibration has it (`siloscope.estimation.surface`)."""
     assumed: tuple[str, ...] = ()
     config: dict[str, Any] = field(default_factory=dict)
+    floor: Floor = field(default_factory=Floor)
+    missing: tuple[str, ...] = ()
+    """What a volume needs and nobody knows, in the words of the options."""
+    remarks: tuple[Remark, ...] = ()
+    """Contradictions between what was given and what was seen."""
 
 
 def know(
-    calibration: Calibration, sensor: SensorProfile | None, sheet: Datasheet, top: float | None, diameter: float | None
+    calibration: Calibration,
+    sensor: SensorProfile | None,
+    sheet: Datasheet,
+    top: float | None,
+    diameter: float | None,
+    steepest: float = STEEPEST_REPOSE,
 ) -> Knowledge:
     """Puts calibration, sensor profile and datasheet together.
 
@@ -56,9 +73,10 @@ def know(
     InputError
         For a calibration that was refused.
     UsageError
-        For a diameter that contradicts the calibration, or a sensor with another bias than the calibration's.
+        For a diameter of another vessel, or a sensor with another bias than the calibration's.
     """
-    if calibration.pose is None:
+    pose = calibration.pose
+    if pose is None:
         raise InputError(f"the calibration has no answer ({calibration.reason}); calibrate with frames that show wall")
     own = sensors.from_record(calibration.config.get("sensor"))
     profile = sensor or own or sensors.UNKNOWN
@@ -68,16 +86,22 @@ def know(
             "out, or calibrate with it"
         )
     sheet = _with_tape(sheet, calibration)
+    floor, remarks = floor_of(calibration, sheet, steepest)
+    if floor.kind == "flat":
+        sheet = replace(sheet, bottom="flat", cone=None)
+    if floor.kind != "cone" or floor.seen is None:
+        calibration = _without_cone(calibration)
     lengths = _cone_alone(calibration, _joint(calibration, complete(calibration.silo, sheet, top), sheet))
     covariance = _covariance(calibration, lengths)
-    _check_diameter(diameter, calibration.silo, float(covariance[4, 4]))
+    remarks += _other_diameter(diameter, calibration.silo, float(covariance[4, 4]))
+    remarks += _other_joint(calibration, sheet, top)
     assumed = list(lengths.assumed)
     if profile.noise is None:
         assumed.append("noise of a typical structured-light sensor")
     if calibration.parameters is None:
         assumed.append("the calibration was averaged by the paper's rule: its lengths have no covariance")
     return Knowledge(
-        calibration.pose,
+        pose,
         lengths,
         covariance,
         _bias(calibration, profile),
@@ -87,7 +111,23 @@ def know(
         _ovality(calibration),
         tuple(assumed),
         {"sensor": profile.to_dict()},
+        floor,
+        lacking(lengths.geometry, sheet, top) if floor.known else ("bottom",),
+        remarks,
     )
+
+
+def _without_cone(calibration: Calibration) -> Calibration:
+    """The calibration without the conical surface that it has seen, which is not the bottom."""
+    values, covariance = calibration.parameters, calibration.parameter_covariance
+    if values is not None:
+        values = values.copy()
+        values[5:7] = np.nan
+    if covariance is not None:
+        covariance = covariance.copy()
+        covariance[5:7] = covariance[:, 5:7] = 0.0
+    silo = SiloGeometry(radius=calibration.silo.radius)
+    return replace(calibration, parameters=values, parameter_covariance=covariance, silo=silo)
 
 
 def _with_tape(sheet: Datasheet, calibration: Calibration) -> Datasheet:
@@ -201,13 +241,29 @@ def _jacobian(calibration: Calibration, lengths: Lengths) -> NDArray[np.float64]
     return np.nan_to_num(jacobian)
 
 
-def _check_diameter(diameter: float | None, silo: SiloGeometry, variance: float) -> None:
-    """A tape-measured diameter must agree with the calibration's; it belongs into the calibration."""
+def _other_diameter(diameter: float | None, silo: SiloGeometry, variance: float) -> tuple[Remark, ...]:
+    """A warning where a tape-measured diameter differs from the calibration's; it belongs into the calibration."""
     if diameter is None or silo.radius is None:
-        return
-    gap = abs(diameter / 2.0 - silo.radius)
-    if gap > 5.0 * math.sqrt(variance) + 0.005:
+        return ()
+    gap, std = abs(diameter - 2.0 * silo.radius), math.hypot(2.0 * math.sqrt(variance), LENGTH_STD)
+    if gap > ANOTHER_VESSEL * diameter:
         raise UsageError(
-            f"a diameter of {diameter:g} m does not fit the calibration's {2 * silo.radius:.3f} m; "
-            "calibrate with --diameter, which puts every length right"
+            f"a diameter of {diameter:g} m does not fit the calibration's {2.0 * silo.radius:.3f} m; check the number "
+            "and the calibration, they are of two vessels"
         )
+    if gap <= CONTRADICTION_STD * std:
+        return ()
+    numbers = f"a diameter of {diameter:.3f} m is given, the calibration has {2.0 * silo.radius:.3f} m, which counts; "
+    return (Remark("vessel-contradicted", f"{numbers}calibrate with --diameter, which puts every length right"),)
+
+
+def _other_joint(calibration: Calibration, sheet: Datasheet, top: float | None) -> tuple[Remark, ...]:
+    """A warning where the cylinder's bottom that was seen is not where top and cylinder put it."""
+    seen = calibration.silo.cylinder_bottom
+    if seen is None or top is None or sheet.cylinder is None:
+        return ()
+    std = math.hypot(calibration.silo_std.cylinder_bottom or 0.0, math.sqrt(2.0) * LENGTH_STD)
+    if abs(top + sheet.cylinder - seen) <= CONTRADICTION_STD * std:
+        return ()
+    numbers = f"top and cylinder put the cylinder's bottom at {top + sheet.cylinder:.3f} m, it is seen at {seen:.3f} m"
+    return (Remark("vessel-contradicted", f"{numbers}, which counts"),)

@@ -11,9 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from siloscope import _core
 from siloscope.content import quality
-from siloscope.content.capacity import Datasheet, Strapping, missing
+from siloscope.content.capacity import Datasheet, Strapping
 from siloscope.content.density import Density
+from siloscope.content.floor import settles
 from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge
+from siloscope.content.ullage import ullage_of
 from siloscope.errors import InputError, UsageError
 from siloscope.reasons import CONTENT_REMARKS, sentence
 from siloscope.types.content import Content, Level, Parts, Remark
@@ -56,13 +58,14 @@ def content_of(
     lacking = _lacking(known, found)
     capacity, capacity_from = _capacity(request, silo, lacking)
     coverage = _coverage(found)
-    said = tuple(quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
+    said = (*known.remarks, *quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
     frame: dict[str, Any] = {
         "source": source_of(request.data),
         "timestamp": request.data.timestamp if isinstance(request.data, Frame) else None,
         "config": {**_config(request), **config},
         "timing_ms": times,
         "lengths": known.lengths,
+        "floor": known.floor,
         "missing": lacking,
         "assumed": known.assumed,
         "capacity": capacity,
@@ -74,10 +77,22 @@ def content_of(
         return _refused(against, frame)
     if any(remark.code == "camera-moved" for remark in said):
         found = {**found, "std": _with_move(found)}
+    free = ullage_of(found, known, silo)
+    if lacking and free is not None:
+        found = {**found, "std": {**found["std"], "total": free.std}}
     answer = _empty(request, found, silo) if _is_empty(found) else _filled(request, found, core, silo, lacking)
     parts = None if lacking else Parts(*(found["std"][name] for name in Parts.__dataclass_fields__))
+    if lacking:
+        frame |= {"message": settles(known.floor, lacking), "quality": (*said, _unknown_bottom(known, lacking))}
+    if free is not None:
+        frame |= {"ullage": free.volume, "ullage_std": free.std, "ullage_parts": free.parts}
     now = Content("ok", parts=parts, coverage=coverage, shape=Shape.of(found["shape"]), **answer, **frame)
     return _moving(now, request.previous)
+
+
+def _unknown_bottom(known: Knowledge, lacking: tuple[str, ...]) -> Remark:
+    seen = "" if known.floor.seen is None else f"; a conical surface of {known.floor.seen} is seen"
+    return Remark("bottom-unknown", f"not known: {', '.join(lacking)}{seen}")
 
 
 def _with_move(found: dict[str, Any]) -> dict[str, float]:
@@ -116,7 +131,7 @@ def _filled(
         "volume": volume,
         "volume_std": std,
         "level": level,
-        "height_datum": "cone-vertex" if vertex else "lowest-seen",
+        "height_datum": _datum(request.known),
         "surface": surface,
         **_mass(request.density, volume, std, surface, silo),
     }
@@ -126,7 +141,7 @@ def _empty(request: Request, found: dict[str, Any], silo: tuple[float, ...]) -> 
     """No content seen: none, up to the level that could hide on the vertex unseen."""
     known = request.known
     volume, std = None, None
-    if not missing(known.lengths.geometry):
+    if not known.missing:
         radius, bottom, apex, *_ = silo
         thin = DETECTABLE * math.hypot(WALL_STD, math.sqrt(max(float(known.covariance[6, 6]), 0.0)))
         hidden = max(thin, found["bare"][0] * (apex - bottom) / radius)
@@ -135,15 +150,22 @@ def _empty(request: Request, found: dict[str, Any], silo: tuple[float, ...]) -> 
         "volume": volume,
         "volume_std": std,
         "level": Level(*[0.0] * 4),
-        "height_datum": "lowest-seen" if known.lengths.geometry.apex is None else "cone-vertex",
+        "height_datum": _datum(known),
         **_mass(request.density, volume, std, None, silo),
     }
+
+
+def _datum(known: Knowledge) -> str:
+    """What heights are measured from."""
+    if known.lengths.geometry.apex is None:
+        return "lowest-seen"
+    return "cone-vertex" if known.floor.kind == "cone" else "floor"
 
 
 def _lacking(known: Knowledge, found: dict[str, Any]) -> tuple[str, ...]:
     """Lengths without which there is no volume; of a cone alone, the radius where the content may reach beyond it."""
     if not known.lengths.cone_only:
-        return missing(known.lengths.geometry)
+        return known.missing
     numbers, bare = found["volume"], found["bare"]
     inside = numbers is None or (bare is not None and numbers["reach"] <= bare[1])
     return () if inside else ("radius",)

@@ -23,6 +23,7 @@ from siloscope.schema.fields import (
     triangle,
     vector,
 )
+from siloscope.schema.floor import FloorDocument
 from siloscope.schema.sensor_profile import SensorRecord
 from siloscope.schema.validation import Document, validated, wrong
 
@@ -245,6 +246,7 @@ class CalibrationDocument(Pose):
     checked: Config = Field(alias="config")
     timing_ms: dict[str, Number]
     evidence: Evidence
+    floor: FloorDocument | None = None
 
     @model_validator(mode="after")
     def _answered(self) -> CalibrationDocument:

@@ -34,6 +34,8 @@ class ProductFile(StrictDocument):
     source: str = ""
     friction: Number = 0.4
     pressure_ratio: Number = 0.5
+    steepest_repose: Number | None = None
+    """Degrees."""
     compaction: Annotated[tuple[tuple[float, float], ...], PlainValidator(_curve)] = ()
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from siloscope.parameters import PARAMETERS
 from siloscope.reasons import FRAME_STATUSES
 from siloscope.schema import CALIBRATION
+from siloscope.types.floor import Floor, SeenCone
 from siloscope.types.frame_factor import FrameFactor, SummedFactor
 from siloscope.types.move import Move
 from siloscope.types.pose import SiloPose
@@ -22,6 +23,7 @@ from siloscope.types.vessel import SiloGeometry
 if TYPE_CHECKING:
     from siloscope.schema.calibration import CalibrationDocument, Record
     from siloscope.schema.calibration import Evidence as EvidenceDocument
+    from siloscope.schema.floor import FloorDocument
 
 
 @dataclass(frozen=True)
@@ -108,6 +110,8 @@ class Calibration:
     timing_ms: dict[str, float] = field(default_factory=dict)
     evidence: Evidence = field(default_factory=Evidence)
     method: str = "surface"
+    floor: Floor = field(default_factory=Floor)
+    """What the calibration was told of the bottom, or has proved."""
 
     @property
     def ok(self) -> bool:
@@ -171,6 +175,7 @@ class Calibration:
                 "point": None if pose is None else pose.axis_point.tolist(),
             },
             "silo": {**self.silo.to_dict(), "std": self.silo_std.to_dict()},
+            "floor": self.floor.to_dict(),
             "ratios": {"pixels": None, "area": None},
             "parameters": self._parameters(),
             "excess": self.excess,
@@ -239,7 +244,13 @@ def _from_document(told: CalibrationDocument, config: dict[str, Any]) -> Calibra
         told.timing_ms,
         _evidence(told.evidence),
         told.method,
+        Floor() if told.floor is None else _floor(told.floor),
     )
+
+
+def _floor(told: FloorDocument) -> Floor:
+    seen = told.seen_cone
+    return Floor(told.kind, told.evidence, None if seen is None else SeenCone(seen.angle_rad, seen.std_rad))
 
 
 def _record(told: Record) -> FrameRecord:

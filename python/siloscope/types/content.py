@@ -6,8 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
-from siloscope.reasons import CONTENT_REMARKS
+from siloscope.reasons import CONTENT_NOTES, CONTENT_REMARKS
 from siloscope.schema import CONTENT
+from siloscope.types.floor import Floor
 from siloscope.types.surface_map import Shape, SurfaceMap
 from siloscope.types.vessel import Lengths, to_plain
 
@@ -32,13 +33,18 @@ class Remark:
         """What to do."""
         return CONTENT_REMARKS[self.code][1]
 
+    @property
+    def severity(self) -> str:
+        """ "note", "warning" or "refusal"."""
+        return "refusal" if self.refuses else "note" if self.code in CONTENT_NOTES else "warning"
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
-        return {"code": self.code, "message": self.message, "advice": self.advice, "seen": self.seen,
-                "refuses": self.refuses}  # fmt: skip
+        return {"code": self.code, "message": f"{self.message} ({self.seen})", "severity": self.severity,
+                "advice": self.advice, "seen": self.seen}  # fmt: skip
 
 
-DATUMS = ("cone-vertex", "lowest-seen")
+DATUMS = ("cone-vertex", "floor", "lowest-seen")
 """From where heights are measured upwards."""
 
 
@@ -98,9 +104,14 @@ class Content:
     status: str
     reason: str | None = None
     message: str | None = None
+    """Why there is no answer, or no volume, and what would settle it."""
     volume: float | None = None
     volume_std: float | None = None
     parts: Parts | None = None
+    ullage: float | None = None
+    """Free space under the fill height, m³; it needs no bottom."""
+    ullage_std: float | None = None
+    ullage_parts: Parts | None = None
     capacity: float | None = None
     capacity_from: str | None = None
     """"calibration", "datasheet" or "strapping"."""
@@ -116,10 +127,11 @@ class Content:
     shape: Shape | None = None
     quality: tuple[Remark, ...] = ()
     missing: tuple[str, ...] = ()
-    """Lengths of the silo without which there is no volume."""
+    """What a volume needs and nobody knows: "bottom", or lengths by the names of their options."""
     assumed: tuple[str, ...] = ()
     """What was taken for granted, in words."""
     lengths: Lengths | None = None
+    floor: Floor = field(default_factory=Floor)
     timestamp: float | None = None
     source: str = "frame"
     config: dict[str, Any] = field(default_factory=dict)
@@ -143,19 +155,26 @@ class Content:
 
     @property
     def own_std(self) -> float | None:
-        """The part of the volume's deviation that differs from reading to reading, m³: noise, grid, some of the unseen.
+        """The part of the deviation that differs from reading to reading, m³: noise, grid, some of the unseen.
 
         Pose, geometry and depth err alike in all readings of one calibration, so they drop out of a difference.
         """
-        if self.parts is None:
-            return None
-        return math.hypot(self.parts.noise, self.parts.grid, HIDDEN_ALIKE * self.parts.unseen)
+        parts = self.parts or self.ullage_parts
+        return None if parts is None else math.hypot(parts.noise, parts.grid, HIDDEN_ALIKE * parts.unseen)
 
     def change_since(self, earlier: Content) -> tuple[float, float] | None:
-        """Volume gained since an earlier reading, m³, and its standard deviation (`own_std`); None without a volume."""
-        if self.volume is None or earlier.volume is None or self.own_std is None or earlier.own_std is None:
+        """Volume gained since an earlier reading, m³, and its standard deviation (`own_std`); None without a surface.
+
+        It is the ullage lost where one of the two has no volume, and so needs no bottom.
+        """
+        if self.own_std is None or earlier.own_std is None:
             return None
-        return self.volume - earlier.volume, math.hypot(self.own_std, earlier.own_std)
+        std = math.hypot(self.own_std, earlier.own_std)
+        if self.volume is not None and earlier.volume is not None:
+            return self.volume - earlier.volume, std
+        if self.ullage is not None and earlier.ullage is not None:
+            return earlier.ullage - self.ullage, std
+        return None
 
     def has(self, code: str) -> bool:
         """Whether a remark of this code is there."""
@@ -171,6 +190,8 @@ class Content:
             "volume_m3": self.volume,
             "volume_std_m3": self.volume_std,
             "volume_std_parts_m3": None if self.parts is None else self.parts.to_dict(),
+            "ullage_m3": self.ullage,
+            "ullage_std_m3": self.ullage_std,
             "fill_fraction": self.fill_fraction,
             "free_m3": self.free,
             "capacity_m3": self.capacity,
@@ -185,6 +206,7 @@ class Content:
             "quality": [remark.to_dict() for remark in self.quality],
             "missing": list(self.missing),
             "assumed": list(self.assumed),
+            "floor": self.floor.to_dict(),
             "silo": None if self.lengths is None else to_plain(self.lengths),
             "timestamp": self.timestamp,
             "source": self.source,

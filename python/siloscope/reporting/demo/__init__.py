@@ -117,7 +117,7 @@ def _sensor(method: str) -> str | None:
 
 def fused(steps: Sequence[Step]) -> Calibration:
     """All frames of the discharge as one calibration of the silo."""
-    return siloscope.calibrate([step.estimates["surface"] for step in steps], sensor=SENSOR)
+    return siloscope.calibrate([step.estimates["surface"] for step in steps], sensor=SENSOR, bottom="cone")
 
 
 def measured(steps: Sequence[Step], calibration: Calibration) -> Iterator[Content]:

@@ -1,0 +1,123 @@
+"""The rule by which a surface that was seen, a datasheet or a word of the user becomes the vessel's bottom.
+
+A surface that was seen is a bottom only if it can't be feed: it is steeper than feed can lie, or it was in the same
+place before and after a fill and a draw-down, or the user says so. Else the bottom stays unknown.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from siloscope.content.capacity import LENGTH_STD, Datasheet
+from siloscope.content.density import STEEPEST_REPOSE
+from siloscope.types.calibration import Calibration
+from siloscope.types.content import Remark
+from siloscope.types.floor import Floor, SeenCone
+
+PROOF_STD = 2.0
+"""Standard deviations by which a surface must be steeper than feed."""
+
+CONTRADICTION_STD = 5.0
+"""Standard deviations beyond which a datasheet and what is seen contradict each other."""
+
+
+def floor_of(
+    calibration: Calibration, sheet: Datasheet, steepest: float = STEEPEST_REPOSE
+) -> tuple[Floor, tuple[Remark, ...]]:
+    """What is known of the bottom, with a warning for each contradiction.
+
+    Parameters
+    ----------
+    calibration : Calibration
+        Its cone is what was seen; its own `floor` is what it was told or has proved.
+    sheet : Datasheet
+        What the user says now; it wins over the calibration's floor.
+    steepest : float
+        Steepest slope at which the product lies, radians.
+    """
+    seen = seen_cone(calibration)
+    if sheet.bottom == "unknown":
+        return Floor(seen=seen), ()
+    if sheet.bottom == "flat" or (sheet.bottom is None and sheet.cone == 0.0):
+        return Floor("flat", "datasheet", seen), _against_flat(seen, steepest)
+    if sheet.bottom == "cone" or sheet.cone is not None:
+        return _cone(calibration, sheet, seen, steepest)
+    if calibration.floor.known and calibration.floor.evidence != "steep":
+        return replace(calibration.floor, seen=seen), ()
+    if is_proof(seen, steepest):
+        return Floor("cone", "steep", seen), ()
+    return Floor(seen=seen), ()
+
+
+def calibrated_floor(found: Calibration, bottom: str | None, before: Calibration | None) -> Floor:
+    """The bottom for a calibration to keep: what it is told now, else was told earlier, else has proved."""
+    told = found if before is None or not found.ok else replace(found, floor=before.floor)
+    return floor_of(told, Datasheet(bottom=bottom))[0]
+
+
+def seen_cone(calibration: Calibration) -> SeenCone | None:
+    """The conical surface of a calibration; None where it has none."""
+    if calibration.parameters is not None and calibration.parameters[5] > 0.0:
+        across = float(calibration.parameters[5])  # dr/dz
+        variance = 0.0 if calibration.parameter_covariance is None else calibration.parameter_covariance[5, 5]
+        return SeenCone(math.atan2(1.0, across), math.sqrt(max(float(variance), 0.0)) / (1.0 + across**2))
+    silo = calibration.silo
+    if silo.radius is None or silo.cylinder_bottom is None or silo.apex is None:
+        return None
+    return SeenCone(math.atan2(silo.apex - silo.cylinder_bottom, silo.radius), 0.0)
+
+
+def is_proof(seen: SeenCone | None, steepest: float) -> bool:
+    """Whether a surface is steeper than feed can lie."""
+    return seen is not None and seen.angle - PROOF_STD * seen.std > steepest
+
+
+def _cone(
+    calibration: Calibration, sheet: Datasheet, seen: SeenCone | None, steepest: float
+) -> tuple[Floor, tuple[Remark, ...]]:
+    """A cone, by its lengths or by a word about the one that was seen."""
+    radius = calibration.silo.radius if sheet.diameter is None else sheet.diameter / 2.0
+    if not sheet.cone:
+        return Floor("cone", "told" if seen else "datasheet", seen), ()
+    if seen is None or radius is None:
+        return Floor("cone", "datasheet", seen), ()
+    angle = math.atan2(sheet.cone, radius)
+    std = math.hypot(seen.std, LENGTH_STD / math.hypot(sheet.cone, radius))
+    if abs(angle - seen.angle) <= CONTRADICTION_STD * std:
+        return Floor("cone", "datasheet", seen), ()
+    numbers = f"the datasheet's cone lies at {math.degrees(angle):.1f}°, the surface seen at "
+    numbers += f"{math.degrees(seen.angle):.1f} ± {math.degrees(seen.std):.1f}°"
+    if is_proof(seen, steepest):
+        return Floor("cone", "steep", seen), (Remark("vessel-contradicted", f"{numbers}, and counts"),)
+    taken = Remark("vessel-contradicted", f"{numbers}, and is taken for feed")
+    return Floor("cone", "datasheet"), (taken,)
+
+
+def _against_flat(seen: SeenCone | None, steepest: float) -> tuple[Remark, ...]:
+    """A surface steeper than feed contradicts a flat floor."""
+    if seen is None or not is_proof(seen, steepest):
+        return ()
+    numbers = f"the floor is given as flat, but a conical surface of {seen} was seen, steeper than feed lies"
+    return (Remark("vessel-contradicted", numbers),)
+
+
+def settles(floor: Floor, missing: tuple[str, ...]) -> str:
+    """The sentence that says why there is no volume, and the one thing that would settle it."""
+    lacking = ", ".join(missing)
+    if floor.known:
+        options = " and ".join(f"--{name.replace('_', '-')}" for name in missing if name in GIVEN)
+        remedy = f"give {options}" if options else "calibrate with frames of a lower level"
+        return f"Volume unavailable: of the {floor.kind} bottom the {lacking} is not known; {remedy}."
+    if floor.seen is None:
+        return (
+            "Volume unavailable: the bottom was never seen; calibrate with a frame of the empty vessel (--empty FRAME)."
+        )
+    return (
+        f"Volume unavailable: the conical surface seen ({floor.seen}) may be the bottom or feed; "
+        "say which with --bottom cone or --bottom flat."
+    )
+
+
+GIVEN = ("top", "cylinder", "cone", "diameter")
+"""Lengths that have an option of their own."""

@@ -1,0 +1,89 @@
+"""Free space between the surface and the height up to which the vessel is filled. It needs no bottom."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope import _core
+from siloscope.content.capacity import LENGTH_STD
+from siloscope.content.knowledge import Knowledge
+from siloscope.types.content import Parts
+
+STEP = 1e-4
+"""Half the step of the central differences by a length, m."""
+
+GROUPS = {"pose": slice(0, 4), "geometry": slice(4, 7), "depth": slice(7, 10)}
+"""Parameters by cause (`siloscope.content.knowledge.PARAMETERS`)."""
+
+
+@dataclass(frozen=True)
+class Ullage:
+    """Free space, m³."""
+
+    volume: float
+    std: float
+    parts: Parts
+
+
+def ullage_of(found: dict[str, Any], known: Knowledge, silo: tuple[float, ...]) -> Ullage | None:
+    """The free space over the surface that the core found; None where the radius is not known.
+
+    U = capacity - V with one floor for both, so what lies under the surface cancels: where content covers the floor, U
+    does not depend on it, and a floor put out of sight does as well as the true one.
+
+    Parameters
+    ----------
+    found : dict
+        The core's answer, with or without a surface.
+    known : Knowledge
+        Pose, lengths and their covariance.
+    silo : tuple
+        The lengths that the core measured with.
+    """
+    if known.lengths.cone_only:
+        return None
+    filled = 0.0 if found["volume"] is None else float(found["volume"]["volume"])
+    capacity = _capacity(silo)
+    area = math.pi * silo[0] ** 2
+    by = _capacity_derivatives(silo) - np.asarray(found["derivatives"])
+    top_std = 0.0 if known.lengths.top_from == "camera" else area * LENGTH_STD
+    if known.lengths.top_from == "datasheet":
+        by[5] -= area  # the edge is placed from the joint
+    parts = {name: _std(by, known.covariance, group) for name, group in GROUPS.items()}
+    parts["geometry"] = math.hypot(parts["geometry"], top_std)
+    own = {name: float(found["std"][name]) for name in ("noise", "unseen", "grid")}
+    total = math.hypot(_std(by, known.covariance, slice(None)), top_std, *own.values())
+    return Ullage(capacity - filled, total, Parts(**parts, **own))
+
+
+def _capacity(silo: tuple[float, ...]) -> float:
+    return float(_core.vessel_volume_below(silo, [silo[3]])[0])
+
+
+def _capacity_derivatives(silo: tuple[float, ...]) -> NDArray[np.float64]:
+    """Derivatives (10,) of the capacity by the parameters: only the lengths matter."""
+    made = np.zeros(10)
+    for parameter, place in ((4, 0), (5, 1), (6, 2)):
+        ends = [_capacity(_moved(silo, place, sign * STEP)) for sign in (1.0, -1.0)]
+        made[parameter] = (ends[0] - ends[1]) / (2.0 * STEP)
+    return made
+
+
+def _moved(silo: tuple[float, ...], place: int, step: float) -> tuple[float, ...]:
+    """The vessel with one length changed; a flat floor's two ends move together."""
+    lengths = list(silo)
+    lengths[place] += step
+    lengths[2] = max(lengths[1], lengths[2])
+    lengths[1] = min(lengths[1], lengths[2])
+    return tuple(lengths)
+
+
+def _std(by: NDArray[np.float64], covariance: NDArray[np.float64], group: slice) -> float:
+    own = np.zeros(10)
+    own[group] = by[group]
+    return math.sqrt(max(float(own @ covariance @ own), 0.0))

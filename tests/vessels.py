@@ -1,0 +1,93 @@
+"""Frames of the independent oracle's vessels with what is known about them, for the tests of the content."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+import siloscope
+from oracle import kinds, volumes
+from oracle.feed import Feed
+from oracle.scenes import Scene, Vessel
+from siloscope import sensors
+from siloscope.sensors import SensorProfile
+from siloscope.types.floor import Floor
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A scene, what it shows, and its truth by quadrature. m³."""
+
+    scene: Scene
+
+    @classmethod
+    def draw(cls, kind: str, seed: int, width: int = 320) -> Seen:
+        """A scene of a kind, told its camera exactly."""
+        drawn = kinds.draw(kind, seed, width)
+        return cls(replace(drawn, told=drawn.camera))
+
+    @property
+    def vessel(self) -> Vessel:
+        """The vessel."""
+        assert self.scene.vessel is not None
+        return self.scene.vessel
+
+    @property
+    def top(self) -> float:
+        """z of the upper edge."""
+        return self.vessel.top
+
+    @cached_property
+    def camera(self) -> siloscope.Camera:
+        """As the product is told it."""
+        c = self.scene.told
+        return siloscope.Camera(c.width, c.height, c.fx, c.fy, c.cx, c.cy)
+
+    @cached_property
+    def frame(self) -> siloscope.Frame:
+        """What the sensor measures."""
+        return siloscope.Frame(depth=self.scene.shoot().reading, camera=self.camera)
+
+    @cached_property
+    def profile(self) -> SensorProfile:
+        """The sensor's own bias and noise."""
+        return sensors.load("orbbec-astra-s")
+
+    def calibration(self, floor: Floor | None = None, std: float = 5e-4) -> siloscope.Calibration:
+        """Pose and radius as they are, with a standard deviation; the bottom was never seen."""
+        p, radius = self.scene.pose, self.vessel.wall.radius
+        bias = self.profile.bias
+        values = np.array([p.r_x, p.r_y, p.t_x, p.t_y, radius, np.nan, np.nan, *bias, 0.0, 0.0])
+        covariance = np.diag([std**2] * 5 + [0.0] * 7)
+        return siloscope.Calibration(
+            "ok",
+            pose=siloscope.SiloPose(*values[:4]),
+            covariance=covariance[:4, :4],
+            silo=siloscope.SiloGeometry(radius=radius),
+            silo_std=siloscope.SiloGeometry(radius=std),
+            parameters=values,
+            parameter_covariance=covariance,
+            config={"sensor": self.profile.to_dict()},
+            floor=floor or Floor(),
+        )
+
+    def with_feed(self, feed: Feed | None) -> Seen:
+        """The same vessel and camera with another feed."""
+        return Seen(replace(self.scene, feed=feed))
+
+    @cached_property
+    def ullage(self) -> float:
+        """Free volume up to the upper edge."""
+        return volumes.ullage(self.vessel, self.scene.feed)
+
+    @cached_property
+    def content(self) -> float:
+        """Volume of the feed."""
+        return volumes.content(self.vessel, self.scene.feed)
+
+    @cached_property
+    def capacity(self) -> float:
+        """Volume of the empty vessel up to its upper edge."""
+        return volumes.ullage(self.vessel, None)
