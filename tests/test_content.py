@@ -417,6 +417,21 @@ def _other_silo() -> siloscope.Content:
     return siloscope.measure(made.render().frame(), known(short))
 
 
+def _without_radius() -> siloscope.Calibration:
+    made = known(scene(None))
+    assert made.parameters is not None
+    values = made.parameters.copy()
+    values[4:7] = np.nan
+    return replace(made, parameters=values, silo=siloscope.SiloGeometry(), floor=Floor())
+
+
+def _deep() -> siloscope.Content:
+    """The surface lies beyond the Astra's 8 m: nothing comes back from it."""
+    made = scene(Feed("flat", 0.1), silo=Silo(radius=1.25, cylinder_height=10.0, cone_height=1.2))
+    made = replace(made, sensor=replace(ASTRA_S, max_range=8.0))
+    return siloscope.measure(made.render().frame(), known(made), sensor="orbbec-astra-s")
+
+
 CASES: dict[str, Callable[[], siloscope.Content]] = {
     "too-little-seen": _nothing,
     "partly-seen": _partly,
@@ -431,6 +446,8 @@ CASES: dict[str, Callable[[], siloscope.Content]] = {
     "filling-in-progress": _filling,
     "camera-moved": _moved_camera,
     "below-the-floor": _other_silo,
+    "radius-unknown": lambda: siloscope.measure(np.ones((240, 320), np.float32), _without_radius(), silos.SMALL),
+    "beyond-range": _deep,
     "bottom-unknown": lambda: measured(scene(Feed("mound", 0.4)), bottom="unknown")[0],
     "vessel-contradicted": lambda: measured(scene(Feed("mound", 0.4)), diameter=2.6)[0],
 }

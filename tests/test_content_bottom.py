@@ -13,10 +13,10 @@ import siloscope
 import vessels
 from silos import STOUT, known, measured, noisy, scene
 from siloscope.content import products
-from siloscope.content.capacity import Datasheet
-from siloscope.content.floor import floor_of
 from siloscope.simulation import Feed, Silo
 from siloscope.types.floor import Floor
+from siloscope.vessel.datasheet import Datasheet
+from siloscope.vessel.floor import floor_of
 
 STEEP = Silo(radius=1.0, cylinder_height=2.0, cone_height=1.5)
 
@@ -77,7 +77,7 @@ class TestRule:
     def test_it_is_kept_in_the_file(self, tmp_path: Any) -> None:
         made = known(scene(None))
         made.save(tmp_path / "silo.json")
-        assert siloscope.Calibration.load(tmp_path / "silo.json").floor == made.floor
+        assert siloscope.Calibration.load(tmp_path / "silo.json").floor.to_dict() == made.floor.to_dict()
 
 
 class TestUllage:

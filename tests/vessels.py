@@ -9,11 +9,18 @@ import numpy as np
 
 import siloscope
 from oracle import kinds, volumes
+from oracle.clutter import Bar
 from oracle.feed import Feed
 from oracle.scenes import Scene, Vessel
+from oracle.solids import Solid
 from siloscope import sensors
 from siloscope.sensors import SensorProfile
 from siloscope.types.floor import Floor
+
+
+def bar(start: tuple[float, float, float], end: tuple[float, float, float], diameter: float) -> Bar:
+    """A round bar; places in the silo frame."""
+    return Bar(start, end, diameter / 2.0)
 
 
 @dataclass(frozen=True)
@@ -76,6 +83,10 @@ class Seen:
     def with_feed(self, feed: Feed | None) -> Seen:
         """The same vessel and camera with another feed."""
         return Seen(replace(self.scene, feed=feed))
+
+    def with_things(self, things: tuple[Solid, ...]) -> Seen:
+        """The same with things hanging in it."""
+        return Seen(replace(self.scene, things=things))
 
     @cached_property
     def ullage(self) -> float:

@@ -11,7 +11,6 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from siloscope.content.floor import calibrated_floor
 from siloscope.errors import UsageError
 from siloscope.fusion.history import History
 from siloscope.fusion.report import calibration_of
@@ -25,6 +24,7 @@ from siloscope.types.calibration import Calibration
 from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
+from siloscope.vessel.floor import calibrated_floor
 
 RULES = ("information", "mean-of-last-10")
 """How frames become one: weighed by their information, or the mean of the last 10 answers (section 2.4.4)."""

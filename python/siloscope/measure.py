@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from siloscope import _core, sensors
 from siloscope.calibrate import calibrate
-from siloscope.content.capacity import LONGEST, Datasheet, Strapping
-from siloscope.content.density import STEEPEST_REPOSE, Density, choose
-from siloscope.content.knowledge import WALL_STD, Knowledge, know, narrowed
-from siloscope.content.reading import Request, content_of, lengths_for_core, source_of
+from siloscope.content.capacity import Strapping
+from siloscope.content.density import Density, choose
+from siloscope.content.extras import with_vessel, without_obstacles
+from siloscope.content.knowledge import WALL_STD, Knowledge, filled_to, know, narrowed
+from siloscope.content.reading import Request, content_of, lengths_for_core, refused, source_of
 from siloscope.errors import InputError, UsageError
 from siloscope.estimation.inputs import Prepared, PreparedPoints, prepare
 from siloscope.locate import locate
@@ -26,6 +27,9 @@ from siloscope.types.camera import Camera
 from siloscope.types.content import Content
 from siloscope.types.depth_frame import DepthFrame
 from siloscope.types.frame import Frame
+from siloscope.vessel.datasheet import LONGEST, Datasheet
+from siloscope.vessel.floor import STEEPEST_REPOSE
+from siloscope.vessel.vessel import Vessel, given
 
 BEHIND = 1.5
 """Cells behind the farthest one that shows the bare cone at which a cone without an end is cut off."""
@@ -43,6 +47,7 @@ def measure(
     cone: float | None = None,
     bottom: str | None = None,
     top: float | None = None,
+    vessel: Vessel | str | Path | None = None,
     outlet_diameter: float = 0.0,
     outlet_length: float = 0.0,
     strapping: Strapping | str | Path | None = None,
@@ -79,6 +84,9 @@ def measure(
     top : float, optional
         z of the silo's upper edge below the camera, m (negative above it), up to which it can be filled. From
         `cylinder` where not given, else the camera's own height.
+    vessel : Vessel or path, optional
+        A vessel file (`siloscope.vessel.vessel.load`): the lengths above and bottoms of other kinds, courses, roof,
+        fill height, obstacles. Single options win over it.
     outlet_diameter, outlet_length : float
         Outlet pipe below the cone, m; counts as part of the silo.
     strapping : Strapping or path, optional
@@ -101,9 +109,13 @@ def measure(
     """
     start = time.perf_counter()
     chosen = choose(density, density_std, product)
+    about = given(
+        vessel, top, diameter=diameter, cylinder=cylinder, cone=cone, bottom=bottom,
+        outlet_diameter=outlet_diameter, outlet_length=outlet_length,
+    )  # fmt: skip
+    sheet, top = about.sheet, about.top
     if top is not None and not abs(top) <= LONGEST:
         raise UsageError(f"top must be between -{LONGEST:g} and {LONGEST:g} m, got {top}")
-    sheet = Datasheet(diameter, cylinder, cone, outlet_diameter, outlet_length, bottom)
     table = strapping if isinstance(strapping, Strapping | None) else Strapping.read(strapping)
     profile = None if sensor is None else sensors.load(sensor)
     steepest = STEEPEST_REPOSE if chosen is None else chosen.steepest
@@ -113,13 +125,17 @@ def measure(
     prepared = prepare(data, _camera(data, camera, located), profile or sensors.UNKNOWN,
                        depth_unit=depth_unit, mask=mask)  # fmt: skip
     ready = time.perf_counter()
+    known = filled_to(known, about)
+    if known.lengths.geometry.radius is None:
+        return refused("radius-unknown", "no cylinder is seen", data, known)
+    prepared = without_obstacles(prepared, known, about)
     if known.lengths.cone_only:
         known = _closer(prepared, known, sheet, located)
     found, surface = _run(prepared, known, sheet)
     done = time.perf_counter()
     request = Request(data, known, sheet, table, chosen, previous, calibration is None)
     times = {"prepare": 1e3 * (ready - start), "measure": 1e3 * (done - ready)}
-    return content_of(request, found, surface, {**prepared.config, **known.config}, times)
+    return with_vessel(content_of(request, found, surface, {**prepared.config, **known.config}, times), about)
 
 
 def _known(
@@ -135,8 +151,8 @@ def _known(
 ) -> tuple[Knowledge | Content, Calibration]:
     """Pose and silo: from the calibration, or from the frame itself."""
     if calibration is not None:
-        given = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
-        return know(given, profile, sheet, top, sheet.diameter, steepest), given
+        silo = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
+        return know(silo, profile, sheet, top, sheet.diameter, steepest), silo
     estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask)
     if not estimate.ok:
         reason, message = estimate.reason, f"{estimate.message} A calibration (--calibration) would do without."

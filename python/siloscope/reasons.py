@@ -93,6 +93,14 @@ CONTENT_REMARKS: dict[str, tuple[str, str]] = {
         "what was given of the vessel contradicts what is seen",
         "check the numbers that were given, and whether the frames are of this vessel",
     ),
+    "radius-unknown": (
+        "the silo's radius is not known, so nothing bounds the surface",
+        "give --diameter, say --bottom cone if the cone seen is the bottom, or calibrate with frames of a lower level",
+    ),
+    "beyond-range": (
+        "the surface lies farther away than the sensor can measure",
+        "the silo may be nearly empty; a sensor of a longer range would tell",
+    ),
     "below-the-floor": (
         "much of what is seen lies below the silo's floor",
         "check that calibration and frame are of one silo and one camera",
@@ -120,7 +128,14 @@ CONTENT_NOTES = ("partly-seen", "bottom-unknown", "filling-in-progress")
 """Codes that only inform; the others warn."""
 
 
-CONTENT_REFUSALS = ("too-little-seen", "sensor-buried", "camera-moved", "below-the-floor")
+CONTENT_REFUSALS = (
+    "too-little-seen",
+    "radius-unknown",
+    "beyond-range",
+    "sensor-buried",
+    "camera-moved",
+    "below-the-floor",
+)
 """Codes that may leave a reading without an answer; the others come beside one."""
 
 

@@ -1,7 +1,8 @@
 """Compares today's results with the ones kept in `golden.json.xz`, to the last bit.
 
     python tests/golden/golden.py            compares; names what differs and exits with 1
-    python tests/golden/golden.py --renew    writes the file anew: only where a commit changes answers on purpose
+    python tests/golden/golden.py --renew    writes the file anew: only where a commit changes answers on purpose;
+                                             with `--only`, those cases of it
 
 `--sums` allows 1e-12, relative: only where a commit changes the order of a summation and says so. `--only TEXT` runs
 the cases whose name contains it. Results of recordings by others are compared where the recordings are there.
@@ -107,7 +108,7 @@ def main() -> int:
     new = run(names, chosen.workers)
     print(f"{len(new)} cases in {time.perf_counter() - start:.0f} s")
     if chosen.renew:
-        write(chosen.file, new)
+        write(chosen.file, dict(sorted({**(read(chosen.file) if chosen.only else {}), **new}.items())))
         return 0
     old = {name: found for name, found in read(chosen.file).items() if chosen.only in name}
     skipped = [name for name in old if name.startswith(RECORDINGS) and name not in new]

@@ -42,8 +42,10 @@ Product = Annotated[
 ]
 
 
-SETTINGS = ("sensor", "diameter", "cylinder", "cone", "bottom", "top", "outlet_diameter", "outlet_length", "strapping",
-            "density", "density_std", "product")  # fmt: skip
+SETTINGS = (
+    *("sensor", "vessel", "diameter", "cylinder", "cone", "bottom", "top", "outlet_diameter", "outlet_length"),
+    *("strapping", "density", "density_std", "product"),
+)
 """Options that the library takes under the same names."""
 
 
@@ -63,6 +65,7 @@ def measure(
     cone: Cone = None,
     bottom: options.Bottom = None,
     top: Top = None,
+    vessel: options.VesselFile = None,
     outlet_diameter: OutletDiameter = 0.0,
     outlet_length: OutletLength = 0.0,
     strapping: Strapping = None,

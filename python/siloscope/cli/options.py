@@ -30,6 +30,9 @@ Gravity = Annotated[
 Bottom = Annotated[
     str | None, typer.Option("--bottom", metavar="KIND", help="cone: the cone seen is the bottom; flat; unknown.")
 ]
+VesselFile = Annotated[
+    Path | None, typer.Option("--vessel", metavar="TOML", help="The vessel: lengths, bottom, courses, roof, obstacles.")
+]
 Stream = Annotated[str | None, typer.Option("--stream", help="Which depth stream of a recording.")]
 Threads = Annotated[int | None, typer.Option("--threads", min=1, max=256, help="Threads to use; 1 unless given.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else.")]

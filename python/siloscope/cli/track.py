@@ -42,6 +42,7 @@ def track(
     cone: one.Cone = None,
     bottom: options.Bottom = None,
     top: one.Top = None,
+    vessel: options.VesselFile = None,
     outlet_diameter: one.OutletDiameter = 0.0,
     outlet_length: one.OutletLength = 0.0,
     strapping: one.Strapping = None,

@@ -7,58 +7,15 @@ import itertools
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from siloscope.errors import InputError, UsageError
+from siloscope.errors import InputError
 from siloscope.types.vessel import Lengths, SiloGeometry
+from siloscope.vessel.datasheet import LENGTH_STD, Datasheet
 
 LARGEST_FILE = 10_000_000
 """Bytes of a strapping table."""
-
-LONGEST = 200.0
-"""Longest length of a silo, m."""
-
-LENGTH_STD = 0.01
-"""Standard deviation of a length of a datasheet, m."""
-
-BOTTOMS = ("cone", "flat", "unknown")
-"""Bottoms that an option tells."""
-
-
-@dataclass(frozen=True)
-class Datasheet:
-    """A silo's inner lengths as its maker gives them, m; None where it does not tell."""
-
-    diameter: float | None = None
-    cylinder: float | None = None
-    """Height of the cylinder."""
-    cone: float | None = None
-    """Height of the cone, from the cylinder's bottom to its vertex; 0 for a flat floor."""
-    outlet_diameter: float = 0.0
-    """Diameter of the outlet pipe; 0 for none."""
-    outlet_length: float = 0.0
-    """How far the pipe's closed end lies below the cone's vertex."""
-    bottom: str | None = None
-    """"cone", "flat" or "unknown"; None where it is not told."""
-
-    def __post_init__(self) -> None:
-        for name, least in (("diameter", 0.01), ("cylinder", 0.0), ("cone", 0.0)):
-            value = getattr(self, name)
-            if value is not None and not least <= value <= LONGEST:
-                raise UsageError(f"{name} must be between {least:g} and {LONGEST:g} m, got {value}")
-        if self.bottom not in (None, *BOTTOMS):
-            raise UsageError(f"bottom '{self.bottom}': give one of {', '.join(BOTTOMS)}")
-        if self.bottom == "flat" and self.cone:
-            raise UsageError(f"a flat bottom has no cone of {self.cone:g} m; give one of the two")
-        for name in ("outlet_diameter", "outlet_length"):
-            if not 0.0 <= getattr(self, name) <= 20.0:
-                raise UsageError(f"{name.replace('_', '-')} must be between 0 and 20 m, got {getattr(self, name)}")
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
 
 @dataclass(frozen=True, eq=False)
@@ -183,6 +140,6 @@ def lacking(geometry: SiloGeometry, sheet: Datasheet, top: float | None) -> tupl
         return tuple("cone" if name == "apex" else name for name in names)
     placing = (("top", top), ("cylinder", sheet.cylinder))
     wanted = [name for name, value in placing if value is None]
-    if "apex" in names and sheet.cone is None and sheet.bottom != "flat":
+    if "apex" in names and sheet.cone is None and sheet.bottom != "flat" and sheet.shape is None:
         wanted.append("cone")
     return tuple(name for name in names if name == "radius") + tuple(wanted)

@@ -14,14 +14,13 @@ from numpy.typing import NDArray
 
 from siloscope.errors import InputError, UsageError
 from siloscope.parameters import GRAVITY
+from siloscope.vessel.floor import STEEPEST_REPOSE
 
 if TYPE_CHECKING:
     from siloscope.schema.product import ProductFile
 
 DENSITIES = (10.0, 10_000.0)
 """Bulk densities that a silo may hold, kg/m³."""
-STEEPEST_REPOSE = math.radians(50.0)
-"""Steepest slope at which feed is found: cohesive meal in the crater of a discharge."""
 STEPS = 400
 """Slices of a column in which the pressure is followed."""
 

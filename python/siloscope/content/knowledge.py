@@ -10,9 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import sensors
-from siloscope.content.capacity import LENGTH_STD, Datasheet, complete, lacking
-from siloscope.content.density import STEEPEST_REPOSE
-from siloscope.content.floor import CONTRADICTION_STD, floor_of
+from siloscope.content.capacity import complete, lacking
 from siloscope.errors import InputError, UsageError
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
@@ -20,6 +18,9 @@ from siloscope.types.content import Remark
 from siloscope.types.floor import Floor
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import Lengths, SiloGeometry
+from siloscope.vessel.datasheet import LENGTH_STD, Datasheet
+from siloscope.vessel.floor import CONTRADICTION_STD, STEEPEST_REPOSE, floor_of
+from siloscope.vessel.vessel import Vessel
 
 PARAMETERS = ("r_x", "r_y", "t_x", "t_y", "radius", "cylinder_bottom", "apex", "offset", "scale", "quadratic")
 """Order of the covariance; the last three are the sensor's depth bias."""
@@ -92,6 +93,7 @@ def know(
     if floor.kind != "cone" or floor.seen is None:
         calibration = _without_cone(calibration)
     lengths = _cone_alone(calibration, _joint(calibration, complete(calibration.silo, sheet, top), sheet))
+    floor = _placed(floor, sheet, lengths.geometry)
     covariance = _covariance(calibration, lengths)
     remarks += _other_diameter(diameter, calibration.silo, float(covariance[4, 4]))
     remarks += _other_joint(calibration, sheet, top)
@@ -112,9 +114,26 @@ def know(
         tuple(assumed),
         {"sensor": profile.to_dict()},
         floor,
-        lacking(lengths.geometry, sheet, top) if floor.known else ("bottom",),
+        _missing(floor, lengths.geometry, sheet, top),
         remarks,
     )
+
+
+def _placed(floor: Floor, sheet: Datasheet, geometry: SiloGeometry) -> Floor:
+    """A bottom of a datasheet hung at the cylinder's lower edge."""
+    if sheet.shape is None or geometry.radius is None or geometry.cylinder_bottom is None:
+        return floor
+    return replace(floor, map=sheet.shape.floor_map(geometry.radius, geometry.cylinder_bottom))
+
+
+def _missing(floor: Floor, geometry: SiloGeometry, sheet: Datasheet, top: float | None) -> tuple[str, ...]:
+    """What a volume needs and nobody knows."""
+    if not floor.known:
+        return ("bottom",)
+    if floor.map is not None:
+        return () if geometry.radius is not None else ("radius",)
+    names = lacking(geometry, sheet, top)
+    return tuple(name for name in names if name != "apex")
 
 
 def _without_cone(calibration: Calibration) -> Calibration:
@@ -136,6 +155,14 @@ def _with_tape(sheet: Datasheet, calibration: Calibration) -> Datasheet:
     if sheet.diameter is not None or not isinstance(taped, int | float):
         return sheet
     return replace(sheet, diameter=float(taped))
+
+
+def filled_to(known: Knowledge, vessel: Vessel) -> Knowledge:
+    """The same, filled up to the vessel's own fill height."""
+    edge, cylinder = vessel.fill_height, vessel.sheet.cylinder
+    if edge is None or cylinder is None or edge >= cylinder or known.lengths.top_from == "camera":
+        return known
+    return replace(known, lengths=replace(known.lengths, top=known.lengths.top + cylinder - edge))
 
 
 def narrowed(known: Knowledge, calibration: Calibration, radius: float) -> Knowledge:

@@ -11,19 +11,24 @@ from numpy.typing import ArrayLike, NDArray
 
 from siloscope import _core
 from siloscope.content import quality
-from siloscope.content.capacity import Datasheet, Strapping
+from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density
-from siloscope.content.floor import settles
 from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge
-from siloscope.content.ullage import ullage_of
+from siloscope.content.over_floor import OverFloor, volume_over
+from siloscope.content.ullage import Ullage, ullage_of
 from siloscope.errors import InputError, UsageError
 from siloscope.reasons import CONTENT_REMARKS, sentence
 from siloscope.types.content import Content, Level, Parts, Remark
 from siloscope.types.frame import Frame
 from siloscope.types.surface_map import Shape, SurfaceMap
+from siloscope.vessel.datasheet import Datasheet
+from siloscope.vessel.floor import settles
 
 FEWEST = 3
 """Fewer cells than this that seem to show content on an otherwise bare floor are no content."""
+
+STRAY = 0.02
+"""Nor is a smaller fraction of the bare cells."""
 
 DETECTABLE = 3.0
 """A heap on the vertex lower than so many standard deviations of a cell's thickness goes unseen."""
@@ -56,7 +61,10 @@ def content_of(
     known = request.known
     silo = lengths_for_core(known, request.sheet)
     lacking = _lacking(known, found)
-    capacity, capacity_from = _capacity(request, silo, lacking)
+    free = ullage_of(found, known, silo)
+    over = _over(core, found, request, silo, free)
+    capacity, capacity_from = _capacity(request, silo, lacking, over)
+    found = _with_total(found, over, free if lacking else None)
     coverage = _coverage(found)
     said = (*known.remarks, *quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
     frame: dict[str, Any] = {
@@ -72,15 +80,12 @@ def content_of(
         "capacity_from": capacity_from,
         "quality": said,
     }
-    against = next((remark for remark in said if remark.refuses), None)
+    against = _beyond_range(known, next((remark for remark in said if remark.refuses), None))
     if against is not None:
         return _refused(against, frame)
     if any(remark.code == "camera-moved" for remark in said):
         found = {**found, "std": _with_move(found)}
-    free = ullage_of(found, known, silo)
-    if lacking and free is not None:
-        found = {**found, "std": {**found["std"], "total": free.std}}
-    answer = _empty(request, found, silo) if _is_empty(found) else _filled(request, found, core, silo, lacking)
+    answer = _empty(request, found, silo) if _is_empty(found) else _filled(request, found, core, silo, lacking, over)
     parts = None if lacking else Parts(*(found["std"][name] for name in Parts.__dataclass_fields__))
     if lacking:
         frame |= {"message": settles(known.floor, lacking), "quality": (*said, _unknown_bottom(known, lacking))}
@@ -88,6 +93,35 @@ def content_of(
         frame |= {"ullage": free.volume, "ullage_std": free.std, "ullage_parts": free.parts}
     now = Content("ok", parts=parts, coverage=coverage, shape=Shape.of(found["shape"]), **answer, **frame)
     return _moving(now, request.previous)
+
+
+def _over(
+    core: _core.ContentSurface | None,
+    found: dict[str, Any],
+    request: Request,
+    silo: tuple[float, ...],
+    free: Ullage | None,
+) -> OverFloor | None:
+    """The content over a floor that is known as a map; None where it is not, or no surface was found."""
+    if request.known.floor.map is None or core is None or free is None:
+        return None
+    return volume_over(core, found, request.known, silo, WALL_STD)
+
+
+def _with_total(found: dict[str, Any], over: OverFloor | None, free: Ullage | None) -> dict[str, Any]:
+    """The core's answer with the deviations of what is stated: content over a map, or ullage alone."""
+    if over is not None:
+        return {**found, "std": {**found["std"], **over.parts.to_dict(), "total": over.std}, "sunken": over.sunken}
+    return found if free is None else {**found, "std": {**found["std"], "total": free.std}}
+
+
+def _beyond_range(known: Knowledge, against: Remark | None) -> Remark | None:
+    """The refusal, by its cause where the floor lies beyond what the sensor can measure."""
+    floor, far = known.floor.map, known.range[1]
+    deepest = known.lengths.geometry.apex if floor is None else floor.lowest
+    if against is None or against.code != "too-little-seen" or deepest is None or deepest <= far:
+        return against
+    return Remark("beyond-range", f"the floor lies at {deepest:.1f} m, the sensor measures up to {far:g} m", True)
 
 
 def _unknown_bottom(known: Knowledge, lacking: tuple[str, ...]) -> Remark:
@@ -103,7 +137,8 @@ def _with_move(found: dict[str, Any]) -> dict[str, float]:
 
 def _is_empty(found: dict[str, Any]) -> bool:
     """Nothing but bare floor is seen."""
-    return found["volume"] is None and found["kinds"][1] < FEWEST and found["bare"] is not None
+    few = max(FEWEST, STRAY * found["kinds"][3])
+    return found["volume"] is None and found["kinds"][1] < few and found["bare"] is not None
 
 
 def _coverage(found: dict[str, Any]) -> float | None:
@@ -120,20 +155,24 @@ def _filled(
     core: _core.ContentSurface | None,
     silo: tuple[float, ...],
     lacking: tuple[str, ...],
+    over: OverFloor | None,
 ) -> dict[str, Any]:
     """Heights, volume and mass under a surface."""
+    floor = request.known.floor.map
     vertex = request.known.lengths.geometry.apex is not None
-    datum = silo[2] if vertex else float(found["volume"]["extremes"][1])
+    lowest = silo[2] if vertex else float(found["volume"]["extremes"][1])
+    datum = lowest if floor is None else floor.lowest
     level = _level(found, core, datum)
     surface = None if core is None else SurfaceMap(core, datum, silo[0])
-    volume, std = (None, None) if lacking else _volume(request, found, silo, level)
+    volume, std = (None, None) if lacking else _volume(request, found, silo, level, over)
+    columns = _columns(surface, silo) if over is None else over.columns[over.columns > 0.0]
     return {
         "volume": volume,
         "volume_std": std,
         "level": level,
         "height_datum": _datum(request.known),
         "surface": surface,
-        **_mass(request.density, volume, std, surface, silo),
+        **_mass(request.density, volume, std, columns, silo),
     }
 
 
@@ -151,13 +190,13 @@ def _empty(request: Request, found: dict[str, Any], silo: tuple[float, ...]) -> 
         "volume_std": std,
         "level": Level(*[0.0] * 4),
         "height_datum": _datum(known),
-        **_mass(request.density, volume, std, None, silo),
+        **_mass(request.density, volume, std, np.zeros(0), silo),
     }
 
 
 def _datum(known: Knowledge) -> str:
     """What heights are measured from."""
-    if known.lengths.geometry.apex is None:
+    if known.lengths.geometry.apex is None and known.floor.map is None:
         return "lowest-seen"
     return "cone-vertex" if known.floor.kind == "cone" else "floor"
 
@@ -171,17 +210,29 @@ def _lacking(known: Knowledge, found: dict[str, Any]) -> tuple[str, ...]:
     return () if inside else ("radius",)
 
 
+def refused(code: str, seen: str, data: Frame | ArrayLike, known: Knowledge) -> Content:
+    """A reading without an answer, before the core was asked."""
+    frame = {"source": source_of(data), "timestamp": data.timestamp if isinstance(data, Frame) else None}
+    return _refused(Remark(code, seen, True), {**frame, "floor": known.floor, "config": known.config})
+
+
 def _refused(remark: Remark, frame: dict[str, Any]) -> Content:
     message = sentence(CONTENT_REMARKS[remark.code], f" ({remark.seen})")
+    others = tuple(other for other in frame.get("quality", ()) if not other.refuses or other.code == remark.code)
+    frame = {**frame, "quality": others if remark in others else (*others, remark)}
     return Content("refused", remark.code, message, **frame)
 
 
-def _capacity(request: Request, silo: tuple[float, ...], lacking: tuple[str, ...]) -> tuple[float | None, str | None]:
+def _capacity(
+    request: Request, silo: tuple[float, ...], lacking: tuple[str, ...], over: OverFloor | None
+) -> tuple[float | None, str | None]:
     if request.strapping is not None:
         return request.strapping.capacity, "strapping"
     if lacking or request.known.lengths.cone_only:
         return None, None
     source = "datasheet" if request.known.lengths.top_from == "datasheet" else "calibration"
+    if request.known.floor.map is not None:
+        return (None, None) if over is None else (over.capacity, source)
     return _core.vessel_volume_below(silo, [silo[3]])[0], source
 
 
@@ -203,8 +254,12 @@ def _level(found: dict[str, Any], core: _core.ContentSurface | None, datum: floa
     )
 
 
-def _volume(request: Request, found: dict[str, Any], silo: tuple[float, ...], level: Level) -> tuple[float, float]:
+def _volume(
+    request: Request, found: dict[str, Any], silo: tuple[float, ...], level: Level, over: OverFloor | None
+) -> tuple[float, float]:
     """Volume by the geometry; with a strapping table, the table's below the mean level and the rest by geometry."""
+    if over is not None:
+        return over.volume, over.std
     volume, std = float(found["volume"]["volume"]), float(found["std"]["total"])
     if request.strapping is None or level.mean is None:
         return volume, std
@@ -216,12 +271,12 @@ def _mass(
     density: Density | None,
     volume: float | None,
     std: float | None,
-    surface: SurfaceMap | None,
+    columns: NDArray[np.float64],
     silo: tuple[float, ...],
 ) -> dict[str, Any]:
     if density is None or volume is None or std is None:
         return {"density": None if density is None else density.to_dict()}
-    mean = density.mean(_columns(surface, silo), silo[0])
+    mean = density.mean(columns, silo[0])
     own = density.std / density.loose * mean
     return {
         "mass": mean * volume,

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
-from siloscope.content.capacity import LENGTH_STD
 from siloscope.content.knowledge import Knowledge
 from siloscope.types.content import Parts
+from siloscope.vessel.datasheet import LENGTH_STD
 
 STEP = 1e-4
 """Half the step of the central differences by a length, m."""
@@ -50,14 +50,14 @@ def ullage_of(found: dict[str, Any], known: Knowledge, silo: tuple[float, ...]) 
     filled = 0.0 if found["volume"] is None else float(found["volume"]["volume"])
     capacity = _capacity(silo)
     area = math.pi * silo[0] ** 2
-    by = _capacity_derivatives(silo) - np.asarray(found["derivatives"])
+    by = capacity_derivatives(silo) - np.asarray(found["derivatives"])
     top_std = 0.0 if known.lengths.top_from == "camera" else area * LENGTH_STD
     if known.lengths.top_from == "datasheet":
         by[5] -= area  # the edge is placed from the joint
-    parts = {name: _std(by, known.covariance, group) for name, group in GROUPS.items()}
+    parts = {name: std_by(by, known.covariance, group) for name, group in GROUPS.items()}
     parts["geometry"] = math.hypot(parts["geometry"], top_std)
     own = {name: float(found["std"][name]) for name in ("noise", "unseen", "grid")}
-    total = math.hypot(_std(by, known.covariance, slice(None)), top_std, *own.values())
+    total = math.hypot(std_by(by, known.covariance, slice(None)), top_std, *own.values())
     return Ullage(capacity - filled, total, Parts(**parts, **own))
 
 
@@ -65,7 +65,7 @@ def _capacity(silo: tuple[float, ...]) -> float:
     return float(_core.vessel_volume_below(silo, [silo[3]])[0])
 
 
-def _capacity_derivatives(silo: tuple[float, ...]) -> NDArray[np.float64]:
+def capacity_derivatives(silo: tuple[float, ...]) -> NDArray[np.float64]:
     """Derivatives (10,) of the capacity by the parameters: only the lengths matter."""
     made = np.zeros(10)
     for parameter, place in ((4, 0), (5, 1), (6, 2)):
@@ -83,7 +83,8 @@ def _moved(silo: tuple[float, ...], place: int, step: float) -> tuple[float, ...
     return tuple(lengths)
 
 
-def _std(by: NDArray[np.float64], covariance: NDArray[np.float64], group: slice) -> float:
+def std_by(by: NDArray[np.float64], covariance: NDArray[np.float64], group: slice) -> float:
+    """Standard deviation by some of the parameters."""
     own = np.zeros(10)
     own[group] = by[group]
     return math.sqrt(max(float(own @ covariance @ own), 0.0))

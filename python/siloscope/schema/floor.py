@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, model_validator
+import numpy as np
+from pydantic import AfterValidator, BeforeValidator, PlainValidator, model_validator
 
 from siloscope.reasons import BOTTOM_EVIDENCE, BOTTOM_KINDS
-from siloscope.schema.fields import NotNegative
+from siloscope.schema.fields import Array, NotNegative, at_least, finite, numbers, vector
 from siloscope.schema.validation import Document, wrong
+
+MOST_CELLS = 512
+"""Rows of a floor's map."""
 
 
 def _kind(value: str) -> str:
@@ -30,12 +34,35 @@ class SeenConeDocument(Document):
     std_rad: NotNegative
 
 
+def _square(value: Any) -> Array:
+    if not isinstance(value, list) or not 2 <= len(value) <= MOST_CELLS:
+        raise wrong(f"must be 2 to {MOST_CELLS} rows")
+    return np.array([numbers(row, len(value)) for row in value])
+
+
+class FloorMapDocument(Document):
+    """Heights of a floor on a square grid."""
+
+    reach: Annotated[float, BeforeValidator(finite), AfterValidator(at_least(0.001))]
+    z: Annotated[Array, PlainValidator(_square)]
+    std: Annotated[Array, PlainValidator(_square)]
+    derivatives: Annotated[Array, vector(10)] | None = None
+    seen: NotNegative
+
+    @model_validator(mode="after")
+    def _fits(self) -> FloorMapDocument:
+        if self.z.shape != self.std.shape or (self.std < 0.0).any():
+            raise wrong("must have a deviation of 0 or more for each height", "std")
+        return self
+
+
 class FloorDocument(Document):
     """What is known of the bottom; a known one says how."""
 
     kind: Annotated[str, AfterValidator(_kind)]
     evidence: Annotated[str, AfterValidator(_evidence)] | None = None
     seen_cone: SeenConeDocument | None = None
+    map: FloorMapDocument | None = None
 
     @model_validator(mode="after")
     def _known_how(self) -> FloorDocument:

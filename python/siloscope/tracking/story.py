@@ -66,7 +66,7 @@ def _readings(moments: Sequence[Moment]) -> Iterator[Reading]:
             c.source,
             moment.time,
             c.status,
-            c.reason if c.status == "refused" else c.message,
+            {"refused": c.reason, "unreadable": c.message}.get(c.status),
             c.volume,
             c.volume_std,
             c.fill_fraction,

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from siloscope.parameters import PARAMETERS
 from siloscope.reasons import FRAME_STATUSES
 from siloscope.schema import CALIBRATION
-from siloscope.types.floor import Floor, SeenCone
+from siloscope.types.floor import Floor, FloorMap, SeenCone
 from siloscope.types.frame_factor import FrameFactor, SummedFactor
 from siloscope.types.move import Move
 from siloscope.types.pose import SiloPose
@@ -175,7 +175,7 @@ class Calibration:
                 "point": None if pose is None else pose.axis_point.tolist(),
             },
             "silo": {**self.silo.to_dict(), "std": self.silo_std.to_dict()},
-            "floor": self.floor.to_dict(),
+            "floor": {**self.floor.to_dict(), "map": None if self.floor.map is None else self.floor.map.to_dict()},
             "ratios": {"pixels": None, "area": None},
             "parameters": self._parameters(),
             "excess": self.excess,
@@ -250,7 +250,9 @@ def _from_document(told: CalibrationDocument, config: dict[str, Any]) -> Calibra
 
 def _floor(told: FloorDocument) -> Floor:
     seen = told.seen_cone
-    return Floor(told.kind, told.evidence, None if seen is None else SeenCone(seen.angle_rad, seen.std_rad))
+    cone = None if seen is None else SeenCone(seen.angle_rad, seen.std_rad)
+    seen_map = None if told.map is None else FloorMap(**_fields(FloorMap, told.map))
+    return Floor(told.kind, told.evidence, cone, seen_map)
 
 
 def _record(told: Record) -> FrameRecord:

@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 
 @dataclass(frozen=True)
 class SeenCone:
@@ -20,7 +23,57 @@ class SeenCone:
         return f"{math.degrees(self.angle):.0f}°"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
+class FloorMap:
+    """A floor on a square grid, z in the silo frame (downwards), m."""
+
+    reach: float
+    """Half the side of the square about the axis."""
+    z: NDArray[np.float64]
+    """(n, n) heights z at the cells' middles, rows along y."""
+    std: NDArray[np.float64]
+    """(n, n) standard deviations, which are taken as common to the whole floor."""
+    derivatives: NDArray[np.float64] | None = None
+    """(10,) derivatives of the empty vessel's ullage by `siloscope.content.knowledge.PARAMETERS`, for a floor that the
+    camera itself saw: it then errs with the camera. None for a floor of a datasheet."""
+    seen: float = 1.0
+    """Fraction of the floor that was seen; the rest is completed."""
+
+    @property
+    def lowest(self) -> float:
+        """z of the lowest place."""
+        return float(self.z.max())
+
+    def at(self, values: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
+        """A map's values between the cells' middles, bilinear, the nearest ones beyond the edge."""
+        side = len(values)
+        column, row = ((v + self.reach) * side / (2.0 * self.reach) - 0.5 for v in (x, y))
+        column, row = (np.clip(v, 0.0, side - 1.0) for v in (column, row))
+        left, low = (np.minimum(v.astype(int), side - 2) for v in (column, row))
+        a, b = column - left, row - low
+        made = (1 - b) * ((1 - a) * values[low, left] + a * values[low, left + 1])
+        made += b * ((1 - a) * values[low + 1, left] + a * values[low + 1, left + 1])
+        return np.asarray(made)
+
+    @staticmethod
+    def middles(reach: float, side: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """x and y (n, n) of the cells' middles."""
+        line = (np.arange(side) + 0.5) * (2.0 * reach / side) - reach
+        x, y = np.meshgrid(line, line)
+        return x, y
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data; heights to 0.01 mm."""
+        return {
+            "reach": self.reach,
+            "z": np.round(self.z, 5).tolist(),
+            "std": np.round(self.std, 6).tolist(),
+            "derivatives": None if self.derivatives is None else self.derivatives.tolist(),
+            "seen": self.seen,
+        }
+
+
+@dataclass(frozen=True, eq=False)
 class Floor:
     """What is known of the bottom; an unknown one gives no volume."""
 
@@ -30,6 +83,8 @@ class Floor:
     """One of `siloscope.reasons.BOTTOM_EVIDENCE`; None for an unknown bottom."""
     seen: SeenCone | None = None
     """The conical surface that was seen, whether it is the bottom or not."""
+    map: FloorMap | None = None
+    """Its heights, where it is neither a coaxial cone nor flat."""
 
     @property
     def known(self) -> bool:
@@ -42,5 +97,6 @@ class Floor:
         return {
             "kind": self.kind,
             "evidence": self.evidence,
+            "seen_fraction": None if self.map is None else self.map.seen,
             "seen_cone": None if seen is None else {"angle_rad": seen.angle, "std_rad": seen.std},
         }

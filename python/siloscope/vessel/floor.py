@@ -9,11 +9,13 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from siloscope.content.capacity import LENGTH_STD, Datasheet
-from siloscope.content.density import STEEPEST_REPOSE
 from siloscope.types.calibration import Calibration
 from siloscope.types.content import Remark
 from siloscope.types.floor import Floor, SeenCone
+from siloscope.vessel.datasheet import LENGTH_STD, Datasheet
+
+STEEPEST_REPOSE = math.radians(50.0)
+"""Steepest slope at which feed is found: cohesive meal in the crater of a discharge."""
 
 PROOF_STD = 2.0
 """Standard deviations by which a surface must be steeper than feed."""
@@ -39,6 +41,8 @@ def floor_of(
     seen = seen_cone(calibration)
     if sheet.bottom == "unknown":
         return Floor(seen=seen), ()
+    if sheet.shape is not None:
+        return Floor(sheet.shape.kind, "datasheet", seen), ()
     if sheet.bottom == "flat" or (sheet.bottom is None and sheet.cone == 0.0):
         return Floor("flat", "datasheet", seen), _against_flat(seen, steepest)
     if sheet.bottom == "cone" or sheet.cone is not None:
