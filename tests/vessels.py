@@ -84,6 +84,10 @@ class Seen:
         """The same vessel and camera with another feed."""
         return Seen(replace(self.scene, feed=feed))
 
+    def again(self, number: int) -> Seen:
+        """The same at another moment: other noise."""
+        return Seen(replace(self.scene, seed=(*self.scene.seed, number)))
+
     def with_things(self, things: tuple[Solid, ...]) -> Seen:
         """The same with things hanging in it."""
         return Seen(replace(self.scene, things=things))

@@ -4,6 +4,7 @@ from siloscope._core import __version__
 from siloscope.calibrate import calibrate
 from siloscope.content import Content, SurfaceMap, surface_map, volume_between
 from siloscope.errors import InputError, SiloscopeError, UsageError
+from siloscope.floors import learn_floor, tare
 from siloscope.io import open
 from siloscope.locate import locate
 from siloscope.measure import measure
@@ -32,10 +33,12 @@ __all__ = [
     "UsageError",
     "__version__",
     "calibrate",
+    "learn_floor",
     "locate",
     "measure",
     "open",
     "surface_map",
+    "tare",
     "track",
     "volume_between",
 ]

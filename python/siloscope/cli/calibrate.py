@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 from rich.console import Console
@@ -14,14 +14,25 @@ from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, REFUSED, check_place, print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.cli.summary import floor_line, headline, pose_table, silo_line, tilt_line
+from siloscope.content.vessel import load as load_vessel
+from siloscope.errors import UsageError
 from siloscope.io import FrameSource
 from siloscope.reasons import CALIBRATION_REMARKS
 from siloscope.types.calibration import Calibration
 
 
 def calibrate(
-    files: Annotated[list[Path], typer.Argument(metavar="FRAMES…", help="Frames, folders or recordings, in order.")],
     out: Annotated[Path, typer.Option("--out", "-o", metavar="FILE", help="Where to write the calibration.")],
+    files: Annotated[
+        list[Path] | None, typer.Argument(metavar="FRAMES…", help="Frames, folders or recordings, in order.")
+    ] = None,
+    empty: Annotated[
+        list[Path] | None, typer.Option("--empty", metavar="FRAME", help="Frame of the empty vessel (tare).")
+    ] = None,
+    learn: Annotated[
+        bool, typer.Option("--learn-floor", help="Learn the floor from a discharge that a refill confirms.")
+    ] = False,
+    vessel: options.VesselFile = None,
     camera: options.CameraFile = None,
     sensor: options.Sensor = None,
     depth_unit: options.DepthUnit = None,
@@ -43,22 +54,34 @@ def calibrate(
     [bold]Example:[/bold] siloscope calibrate day1/*.png --camera camera.json --sensor orbbec-astra-s -o silo7.json
 
     Frames count by what they show; bad ones are left out and named. Where the camera has moved, only the frames since
-    are fused. Exit code 4: no frame shows enough wall; 5: some frames can't be read, the rest is written.
+    are fused. --empty marks frames of the empty vessel: their floor is then known as it is, whatever its shape; with
+    --continue and no FRAMES they only add the floor.
+
+    Exit code 4: no frame shows enough wall; 5: some frames can't be read, the rest is written.
     """
     check_place(out)
     down = None if gravity is None else options.numbers(gravity, 3, "--gravity")
-    with siloscope.open(files, camera=camera, depth_unit=depth_unit, stream=stream) as source:
-        found = siloscope.calibrate(
-            source,
-            sensor=sensor,
-            diameter=diameter,
-            gravity=down,
-            bottom=bottom,
-            continue_from=earlier,
-            rule=rule,
-            jobs=jobs or os.cpu_count() or 1,
-            progress=lambda frames: track(frames, "locating", _count(source)),
-        )
+    about = None if vessel is None else load_vessel(vessel)
+    paths = [*(files or []), *([] if earlier is not None and not files else empty or [])]
+    if not paths and not empty:
+        raise UsageError("nothing to calibrate from; give FRAMES, or --empty FRAME")
+    reading: dict[str, Any] = {"camera": camera, "depth_unit": depth_unit, "stream": stream}
+    if paths:
+        with siloscope.open(paths, **reading) as source:
+            found = siloscope.calibrate(
+                source,
+                sensor=sensor,
+                diameter=diameter if about is None or diameter is not None else about.sheet.diameter,
+                gravity=down,
+                bottom=bottom if about is None or bottom is not None else about.sheet.bottom,
+                continue_from=earlier,
+                rule=rule,
+                jobs=jobs or os.cpu_count() or 1,
+                progress=lambda frames: track(frames, "locating", _count(source)),
+            )
+    else:
+        found = Calibration.load(earlier or "")
+    found = _with_floor(found, empty, files if learn else None, reading, {"sensor": sensor, "vessel": about})
     if _keeps_earlier(found, earlier, out):
         say(f"{out} is left as it was")
     else:
@@ -72,6 +95,28 @@ def calibrate(
     if not found.ok:
         return REFUSED
     return PARTIAL if found.counts["unreadable"] else 0
+
+
+def _with_floor(
+    found: Calibration,
+    empty: list[Path] | None,
+    discharge: list[Path] | None,
+    reading: dict[str, Any],
+    settings: dict[str, Any],
+) -> Calibration:
+    """With the floor of the empty vessel's frames, or of a discharge that a refill confirms."""
+    if not found.ok:
+        return found
+    if empty:
+        with siloscope.open(empty, **reading) as source:
+            return siloscope.tare(found, source, **settings)
+    if not discharge:
+        return found
+    with siloscope.open(discharge, **reading) as source:
+        learned = siloscope.learn_floor(found, track(source, "learning the floor", _count(source)), **settings)
+    if learned is found:
+        say("no floor was learned: no place was seen before and after a fill that covered it")
+    return learned
 
 
 def _keeps_earlier(found: Calibration, earlier: Path | None, out: Path) -> bool:

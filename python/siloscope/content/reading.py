@@ -91,6 +91,7 @@ def content_of(
         frame |= {"message": settles(known.floor, lacking), "quality": (*said, _unknown_bottom(known, lacking))}
     if free is not None:
         frame |= {"ullage": free.volume, "ullage_std": free.std, "ullage_parts": free.parts}
+        frame["ullage_derivatives"] = free.derivatives
     now = Content("ok", parts=parts, coverage=coverage, shape=Shape.of(found["shape"]), **answer, **frame)
     return _moving(now, request.previous)
 

@@ -28,6 +28,8 @@ class Ullage:
     volume: float
     std: float
     parts: Parts
+    derivatives: NDArray[np.float64]
+    """(10,) by the parameters."""
 
 
 def ullage_of(found: dict[str, Any], known: Knowledge, silo: tuple[float, ...]) -> Ullage | None:
@@ -58,7 +60,7 @@ def ullage_of(found: dict[str, Any], known: Knowledge, silo: tuple[float, ...]) 
     parts["geometry"] = math.hypot(parts["geometry"], top_std)
     own = {name: float(found["std"][name]) for name in ("noise", "unseen", "grid")}
     total = math.hypot(std_by(by, known.covariance, slice(None)), top_std, *own.values())
-    return Ullage(capacity - filled, total, Parts(**parts, **own))
+    return Ullage(capacity - filled, total, Parts(**parts, **own), by)
 
 
 def _capacity(silo: tuple[float, ...]) -> float:

@@ -48,6 +48,7 @@ class FloorMapDocument(Document):
     std: Annotated[Array, PlainValidator(_square)]
     derivatives: Annotated[Array, vector(10)] | None = None
     seen: NotNegative
+    completed: str | None = None
 
     @model_validator(mode="after")
     def _fits(self) -> FloorMapDocument:

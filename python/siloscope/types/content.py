@@ -6,6 +6,9 @@ import math
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from siloscope.reasons import CONTENT_NOTES, CONTENT_REMARKS
 from siloscope.schema import CONTENT
 from siloscope.types.floor import Floor
@@ -112,6 +115,8 @@ class Content:
     """Free space under the fill height, m³; it needs no bottom."""
     ullage_std: float | None = None
     ullage_parts: Parts | None = None
+    ullage_derivatives: NDArray[np.float64] | None = None
+    """(10,) derivatives of the ullage by the calibration's parameters."""
     capacity: float | None = None
     capacity_from: str | None = None
     """"calibration", "datasheet" or "strapping"."""

@@ -38,6 +38,8 @@ class FloorMap:
     camera itself saw: it then errs with the camera. None for a floor of a datasheet."""
     seen: float = 1.0
     """Fraction of the floor that was seen; the rest is completed."""
+    completed: str | None = None
+    """The kind of bottom that completes it; None where it is continued from its slope, or seen as a whole."""
 
     @property
     def lowest(self) -> float:
@@ -70,6 +72,7 @@ class FloorMap:
             "std": np.round(self.std, 6).tolist(),
             "derivatives": None if self.derivatives is None else self.derivatives.tolist(),
             "seen": self.seen,
+            "completed": self.completed,
         }
 
 
@@ -98,5 +101,6 @@ class Floor:
             "kind": self.kind,
             "evidence": self.evidence,
             "seen_fraction": None if self.map is None else self.map.seen,
+            "completed_as": None if self.map is None else self.map.completed,
             "seen_cone": None if seen is None else {"angle_rad": seen.angle, "std_rad": seen.std},
         }
