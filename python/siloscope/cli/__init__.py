@@ -38,6 +38,9 @@ COMMANDS: tuple[Command, ...] = (
     Command("convert", "convert:convert", "Extract frames with their camera, times, gravity and provenance."),
     Command("live", "live:live", "Locate continuously from a camera being mounted, with a hint which way to turn it."),
     Command("measure", "measure:measure", "Measure what is in the silo: level, volume, fill, mass."),
+    Command("strap", "strap:strap", "Write a strapping table: volume by height, with its uncertainty."),
+    Command("check-volume", "check_volume:check", "Check volumes by conservation: measured beside moved."),
+    Command("reconcile", "reconcile:reconcile", "Match weighbridge tickets with a track: the lot's density."),
     Command("reproduce", "reproduce:reproduce", "Repeat the paper's tables and figures, ours beside theirs."),
     Command("simulate", "simulate:simulate", "Write depth frames of a simulated silo, with their exact truth."),
 )

@@ -14,11 +14,11 @@ from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, REFUSED, check_place, print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.cli.summary import floor_line, headline, pose_table, silo_line, tilt_line
-from siloscope.content.vessel import load as load_vessel
 from siloscope.errors import UsageError
 from siloscope.io import FrameSource
 from siloscope.reasons import CALIBRATION_REMARKS
 from siloscope.types.calibration import Calibration
+from siloscope.vessel.vessel import load as load_vessel
 
 
 def calibrate(

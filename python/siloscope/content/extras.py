@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.content.knowledge import Knowledge
-from siloscope.estimation.inputs import Prepared
+from siloscope.estimation.inputs import Prepared, PreparedPoints
 from siloscope.types.content import Content
 from siloscope.vessel.vessel import Vessel
 
@@ -50,13 +50,10 @@ def without_obstacles(prepared: Prepared, known: Knowledge, vessel: Vessel) -> P
     edge = known.lengths.geometry.cylinder_bottom
     if not vessel.obstacles or edge is None:
         return prepared
-    if prepared.points is not None:
-        points = prepared.points
-        hidden = vessel.in_obstacle(known.pose.to_silo(np.asarray(points, np.float64)), edge, MARGIN)
-        return replace(prepared, points=points[~hidden])
+    if isinstance(prepared, PreparedPoints):
+        hidden = vessel.in_obstacle(known.pose.to_silo(prepared.points), edge, MARGIN)
+        return replace(prepared, points=prepared.points[~hidden])
     depth, camera = prepared.depth, prepared.camera
-    if depth is None or camera is None:
-        return prepared
     seen = np.nonzero(depth > 0.0)
     deep = _unbiased(depth[seen].astype(np.float64), known.bias)
     points = known.pose.to_silo(np.column_stack([camera.rays()[seen] * deep[:, None], deep]))

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.content.bottoms import Bottom, Oblique
 from siloscope.types.content import Content
 from siloscope.types.floor import FloorMap
+from siloscope.vessel.bottoms import Bottom, Oblique
 
 SIDE = 64
 """Cells of a learned floor along a side."""

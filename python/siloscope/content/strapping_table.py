@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from siloscope import _core
 from siloscope.content.knowledge import Knowledge
 from siloscope.content.reading import lengths_for_core
-from siloscope.content.vessel import Vessel
 from siloscope.errors import InputError
 from siloscope.types.floor import FloorMap
+from siloscope.vessel.vessel import Vessel
 
 COVERAGE_FACTOR = 2.0
 """k of the expanded uncertainty (GUM, 6.3.3): 95 % for a normal variable."""

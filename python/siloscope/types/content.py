@@ -197,6 +197,7 @@ class Content:
             "volume_std_parts_m3": None if self.parts is None else self.parts.to_dict(),
             "ullage_m3": self.ullage,
             "ullage_std_m3": self.ullage_std,
+            "ullage_std_parts_m3": None if self.ullage_parts is None else self.ullage_parts.to_dict(),
             "fill_fraction": self.fill_fraction,
             "free_m3": self.free,
             "capacity_m3": self.capacity,
