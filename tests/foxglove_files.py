@@ -158,7 +158,7 @@ def mcap(
         data = encoded(name, fields) if encoding == "protobuf" else json.dumps(_as_json(fields)).encode()
         time_ns = START_NS + count
         writer.add_message(channels[topic], log_time=time_ns, data=data, publish_time=time_ns)
-    writer.finish()
+    writer.finish()  # type: ignore[no-untyped-call]
     return file.getvalue()
 
 

@@ -11,6 +11,7 @@ import zstandard
 from PIL import Image
 
 import more_files as made
+import recording_files
 import siloscope
 from bags import START_NS, Maker
 from frame_files import CAMERA, CLOUD, METRES, POINTS, RAW, put, read
@@ -218,10 +219,10 @@ def test_bad_packed_files_are_refused_by_their_own_name(tmp_path: Path) -> None:
     recording = made.MAKERS["bag.mcap.zstd"]()
     assert "damaged Zstandard file" in refusal(put(tmp_path, recording[:4] + b"\xff" * 40, "bad.mcap.zstd"))
     assert "holds no recording; unpack it: zstd -d" in refusal(put(tmp_path, zstandard.compress(b"text"), "a.zst"))
-    bomb = zstandard.compress(made.recording_files.ros2(mcap=True) + bytes(80 << 20))
+    bomb = zstandard.compress(recording_files.ros2(mcap=True) + bytes(80 << 20))
     assert len(bomb) < 40_000
     assert "unpacks to more than" in refusal(put(tmp_path, bomb, "bomb.zst"))
-    whole = made.recording_files.ros2(mcap=True)
+    whole = recording_files.ros2(mcap=True)
     cut = zstandard.compress(whole[: len(whole) // 2])
     with siloscope.open(put(tmp_path, cut, "cut.mcap.zst")) as source:
         list(source)
