@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -13,7 +12,8 @@ from numpy.typing import NDArray
 
 from siloscope.errors import InputError
 from siloscope.io.beside import take_camera_beside
-from siloscope.io.source import Format, FrameSource, Item, Options, check_image_size, read_bytes
+from siloscope.io.images.one_image import ImageSource
+from siloscope.io.source import Format, Options, check_image_size, read_bytes
 from siloscope.types.frame import Frame
 
 MAGICS = (b"P5", b"P2", b"Pf", b"PF")
@@ -95,27 +95,15 @@ def _text(name: str, data: bytes, header: Header) -> NDArray[Any]:
     return pixels.reshape(header.height, header.width)
 
 
-class NetpbmSource(FrameSource):
+class NetpbmSource(ImageSource):
     """One PGM or PFM."""
 
-    independent = True
-
     def __init__(self, path: Path, options: Options) -> None:
-        super().__init__(path, "netpbm", options)
         with path.open("rb") as file:
-            self.header = read_header(self.name, file.read(_LONGEST_HEADER))
-        take_camera_beside(self, (self.header.width, self.header.height))
-
-    def _items(self) -> Iterator[Item]:
-        yield Item(self.path.name, lambda: read(self.path))
-
-    def _count(self) -> int:
-        return 1
-
-    def _streams(self) -> list[dict[str, Any]]:
-        kind = "float32" if self.header.kind == "Pf" else "uint16"
-        size = [self.header.width, self.header.height]
-        return [{"name": "depth", "kind": "depth", "size": size, "dtype": kind, "frames": 1, "chosen": True}]
+            header = read_header(str(path), file.read(_LONGEST_HEADER))
+        size = header.width, header.height
+        super().__init__(path, "netpbm", options, size, "float32" if header.kind == "Pf" else "uint16", read)
+        take_camera_beside(self, size)
 
 
 def _sniff(head: bytes, path: Path) -> bool:

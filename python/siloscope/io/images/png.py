@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 from siloscope import _core
 from siloscope.errors import InputError
 from siloscope.io.beside import take_camera_beside
-from siloscope.io.source import Format, FrameSource, Item, Options, check_image_size, read_bytes
+from siloscope.io.images.one_image import ImageSource
+from siloscope.io.source import Format, Options, check_image_size, read_bytes
 from siloscope.types.frame import Frame
 
 MAGIC = b"\x89PNG\r\n\x1a\n"
@@ -46,27 +46,14 @@ def read(path: Path) -> Frame:
     return Frame(depth=decode(str(path), read_bytes(path)), source=str(path))
 
 
-class PngSource(FrameSource):
+class PngSource(ImageSource):
     """One PNG."""
 
-    independent = True
-
     def __init__(self, path: Path, options: Options) -> None:
-        super().__init__(path, "png", options)
         with path.open("rb") as file:
-            self.size = read_size(self.name, file.read(33))
-        take_camera_beside(self, self.size)
-
-    def _items(self) -> Iterator[Item]:
-        yield Item(self.path.name, lambda: read(self.path))
-
-    def _count(self) -> int:
-        return 1
-
-    def _streams(self) -> list[dict[str, Any]]:
-        return [
-            {"name": "depth", "kind": "depth", "size": list(self.size), "dtype": "uint16", "frames": 1, "chosen": True}
-        ]
+            size = read_size(str(path), file.read(33))
+        super().__init__(path, "png", options, size, "uint16", read)
+        take_camera_beside(self, size)
 
 
 FORMAT = Format("png", lambda head, path: head.startswith(MAGIC), PngSource, read_one=read)

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from siloscope.errors import InputError
 from siloscope.io import camera_files
-from siloscope.io.source import Format, FrameSource, Item, Options, check_image_size, read_bytes
+from siloscope.io.images.one_image import ImageSource
+from siloscope.io.source import Format, Options, check_image_size, read_bytes
 from siloscope.types.frame import Frame
 
 _DEPTH = "Z16"
@@ -48,28 +47,15 @@ def read(path: Path) -> Frame:
     return Frame(depth=pixels.reshape(height, width).astype(np.uint16), source=str(path))
 
 
-class ViewerRawSource(FrameSource):
+class ViewerRawSource(ImageSource):
     """One snapshot with its camera; the metadata tell no depth unit."""
 
-    independent = True
-
     def __init__(self, path: Path, options: Options) -> None:
-        super().__init__(path, "viewer-raw", options)
-        self.size = read_size(path)
+        super().__init__(path, "viewer-raw", options, read_size(path), "uint16", read)
         if not options.cameras and options.beside:
             beside = metadata_of(path)
             self.file_camera = camera_files.load(beside, self.size)
             self.provenance["camera_from"] = beside.name
-
-    def _items(self) -> Iterator[Item]:
-        yield Item(self.path.name, lambda: read(self.path))
-
-    def _count(self) -> int:
-        return 1
-
-    def _streams(self) -> list[dict[str, Any]]:
-        stream = {"name": "depth", "kind": "depth", "size": list(self.size), "dtype": "uint16"}
-        return [{**stream, "frames": 1, "chosen": True}]
 
 
 def _sniff(head: bytes, path: Path) -> bool:
