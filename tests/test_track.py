@@ -17,7 +17,7 @@ from siloscope.content import Content, Parts
 from siloscope.errors import InputError, UsageError
 from siloscope.simulation import Feed
 from siloscope.tracking.events import events, legs
-from siloscope.tracking.story import Moment, track_of
+from siloscope.tracking.story import reading_of, track_of
 from siloscope.tracking.use import Rate, forecast, use
 from siloscope.types.track import DAY, utc
 
@@ -26,7 +26,7 @@ START = 1_772_000_000.0
 
 def story(volumes: list[float | None], hours: float = 1.0, noise: float = 0.002) -> siloscope.Track:
     """A track of readings with these volumes; None is a refused one."""
-    moments = []
+    readings = []
     for i, volume in enumerate(volumes):
         parts = Parts(0.01, 0.01, 0.0, noise, 0.0, 0.0)
         content = (
@@ -34,8 +34,8 @@ def story(volumes: list[float | None], hours: float = 1.0, noise: float = 0.002)
             if volume is None
             else Content("ok", volume=volume, volume_std=0.02, parts=parts, capacity=10.0, mass=600.0 * volume)
         )
-        moments.append(Moment(i, START + 3600.0 * hours * i, content, None))
-    return track_of(moments)
+        readings.append(reading_of(i, START + 3600.0 * hours * i, content))
+    return track_of(readings, capacity=10.0)
 
 
 def test_a_quiet_silo_has_no_events() -> None:
@@ -101,8 +101,8 @@ def test_only_frames_taken_together_tell_that_the_content_moves() -> None:
 
 
 def test_without_times_there_is_no_use() -> None:
-    moments = [Moment(i, None, Content("ok", volume=5.0 - i, volume_std=0.1), None) for i in range(4)]
-    assert track_of(moments).use is None
+    readings = [reading_of(i, None, Content("ok", volume=5.0 - i, volume_std=0.1)) for i in range(4)]
+    assert track_of(readings).use is None
 
 
 @given(st.lists(st.floats(0.0, 10.0), min_size=2, max_size=60), st.floats(0.01, 3.0))

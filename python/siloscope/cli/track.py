@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from datetime import UTC, datetime
 from pathlib import Path
@@ -55,6 +56,14 @@ def track(
     start: Annotated[
         str | None, typer.Option(metavar="TIME", help="Time of the first of them, such as 2026-03-01T06:00Z.")
     ] = None,
+    earlier: Annotated[
+        Path | None,
+        typer.Option("--continue", metavar="FILE", help="An earlier track.json to go on with."),
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="The silo's name, for the report.")] = None,
+    jobs: Annotated[
+        int | None, typer.Option(min=1, max=256, help="Frames at the same time; all cores unless given.")
+    ] = None,
     stream: options.Stream = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write tables, trend and report here.")] = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write a Parquet table too (needs pyarrow).")] = False,
@@ -78,6 +87,9 @@ def track(
             silo,
             interval=interval,
             start=_time(start),
+            continue_from=earlier,
+            jobs=jobs or os.cpu_count() or 1,
+            name=name,
             progress=lambda frames: bar(frames, "measuring", _count(source)),
             **settings,
         )

@@ -93,7 +93,7 @@ def content_of(
         frame |= {"ullage": free.volume, "ullage_std": free.std, "ullage_parts": free.parts}
         frame["ullage_derivatives"] = free.derivatives
     now = Content("ok", parts=parts, coverage=coverage, shape=Shape.of(found["shape"]), **answer, **frame)
-    return _moving(now, request.previous)
+    return with_movement(now, request.previous)
 
 
 def _over(
@@ -297,7 +297,7 @@ def _columns(surface: SurfaceMap | None, silo: tuple[float, ...]) -> NDArray[np.
     return np.asarray(rise[rise > 0.0])
 
 
-def _moving(now: Content, previous: Content | None) -> Content:
+def with_movement(now: Content, previous: Content | None) -> Content:
     """With the remark that the content moved since the frame before, where it did."""
     change = None if previous is None else now.change_since(previous)
     if change is None or abs(change[0]) <= quality.MOVING * change[1]:

@@ -96,7 +96,7 @@ def report(found: Track) -> Report:
     from siloscope.reporting.plots import png
     from siloscope.reporting.plots.content import height_map
 
-    page = Report("Silo content", _lead(found)).cards(_cards(found))
+    page = Report(found.name or "Silo content", _lead(found)).cards(_cards(found))
     page.section("Volume over time", picture(png(trend(found)), "Volume with its 95 % band and the forecast."))
     if found.last is not None and found.last.surface is not None:
         shown = picture(png(height_map(found.last)), "Height map of the last reading, and how sure it is.")
@@ -113,7 +113,11 @@ def _lead(found: Track) -> str:
     counts = found.counts
     failed = counts["refused"] + counts["unreadable"]
     left_out = f", {failed} without an answer" if failed else ""
-    return f"{len(found.readings)} readings{left_out}; volumes with one standard deviation."
+    last = next((r.time for r in reversed(found.readings) if utc(r.time) is not None), None)
+    until = "" if last is None else f" until {when(last)}"
+    missing = f" {len(found.gaps)} stretches without readings." if found.gaps else ""
+    counted = "" if found.basis == "volume" else " The bottom is not known: changes are those of the free space."
+    return f"{len(found.readings)} readings{until}{left_out}; amounts with one standard deviation.{missing}{counted}"
 
 
 def _cards(found: Track) -> list[tuple[str, str]]:

@@ -12,8 +12,9 @@ from siloscope.schema import documents
 from siloscope.types.track import Track
 
 COLUMNS = (
-    *("index", "name", "time", "time_utc", "status", "reason", "volume_m3", "volume_std_m3", "fill_fraction"),
-    *("level_m", "mass_kg", "mass_std_kg", "coverage", "flow_m3_h", "mass_flow_t_h", "quality"),
+    *("index", "name", "time", "time_utc", "status", "reason", "volume_m3", "volume_std_m3", "ullage_m3"),
+    *("ullage_std_m3", "fill_fraction", "level_m", "mass_kg", "mass_std_kg", "coverage", "flow_m3_h"),
+    *("mass_flow_t_h", "quality"),
 )
 """Columns of the tables, in their order."""
 
@@ -21,7 +22,7 @@ COLUMNS = (
 def write_csv(path: Path, found: Track) -> Path:
     """One line a reading; empty cells for what is not known, quality codes joined by blanks."""
     with path.open("w", newline="", encoding="utf-8", errors="replace") as file:
-        writer = csv.DictWriter(file, COLUMNS)
+        writer = csv.DictWriter(file, COLUMNS, extrasaction="ignore")
         writer.writeheader()
         writer.writerows(_rows(found))
     return path

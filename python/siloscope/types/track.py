@@ -41,6 +41,17 @@ class Reading:
     mass_flow: float | None = None
     """The same in t/h."""
     quality: tuple[str, ...] = ()
+    ullage: float | None = None
+    """Free space, m³."""
+    ullage_std: float | None = None
+    own_std: float | None = None
+    """The part of the deviation that differs from reading to reading, m³ (`Content.own_std`)."""
+    density: float | None = None
+    """kg/m³."""
+    datum: float | None = None
+    """z of the height's zero, m."""
+    digest: str | None = None
+    """Hash of the frame's measurements, by which a frame is known again."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data with the units in the names."""
@@ -53,6 +64,9 @@ class Reading:
             "reason": self.reason,
             "volume_m3": self.volume,
             "volume_std_m3": self.volume_std,
+            "ullage_m3": self.ullage,
+            "ullage_std_m3": self.ullage_std,
+            "own_std_m3": self.own_std,
             "fill_fraction": self.fill_fraction,
             "level_m": self.level,
             "mass_kg": self.mass,
@@ -60,7 +74,10 @@ class Reading:
             "coverage": self.coverage,
             "flow_m3_h": self.flow,
             "mass_flow_t_h": self.mass_flow,
+            "density_kg_m3": self.density,
+            "datum_m": self.datum,
             "quality": list(self.quality),
+            "digest": self.digest,
         }
 
 
@@ -141,6 +158,12 @@ class Track:
     last: Content | None = None
     """The last reading with an answer, with its surface."""
     config: dict[str, Any] = field(default_factory=dict)
+    basis: str = "volume"
+    """What changes are counted by: "volume", or "ullage" where the bottom is not known."""
+    gaps: tuple[tuple[float, float], ...] = ()
+    """Beginnings and ends of stretches without a reading, s."""
+    name: str | None = None
+    """The silo's."""
 
     @property
     def counts(self) -> dict[str, int]:
@@ -154,6 +177,9 @@ class Track:
             "status": "ok" if self.counts["ok"] else "refused",
             "reason": None if self.counts["ok"] else _commonest(self.readings),
             "counts": self.counts,
+            "name": self.name,
+            "basis": self.basis,
+            "gaps": [{"start": a, "end": b, "start_utc": utc(a), "end_utc": utc(b)} for a, b in self.gaps],
             "capacity_m3": self.capacity,
             "height_datum": self.height_datum,
             "readings": [reading.to_dict() for reading in self.readings],
