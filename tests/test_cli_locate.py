@@ -18,8 +18,8 @@ from PIL import Image
 import realdata
 import siloscope
 from siloscope.cli import main
+from siloscope.estimation.methods import METHODS
 from siloscope.io.writers import write_camera, write_npy, write_ply, write_png
-from siloscope.locate import METHODS
 from siloscope.simulation.scenarios import scenario
 from siloscope.wording import printable
 

@@ -2,40 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from siloscope import sensors
 from siloscope.errors import UsageError
-from siloscope.estimation import shape_tensor, surface
-from siloscope.estimation.inputs import Prepared, PreparedDepth, PreparedPoints, prepare
-from siloscope.estimation.priors import CLOUD, Priors
+from siloscope.estimation.inputs import prepare
+from siloscope.estimation.methods import METHODS
+from siloscope.estimation.settings import Number, Settings
 from siloscope.estimation.steps import NEIGHBOURS
 from siloscope.sensors import SensorProfile
-from siloscope.types.camera import Camera, is_number
+from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
-
-Number = float | None
-
-
-@dataclass(frozen=True)
-class Settings:
-    """What the caller asks for, checked."""
-
-    profile: SensorProfile
-    diameter: Number
-    gravity: NDArray[np.float64] | None
-    grid: Number
-    neighbours: int
-    threads: int
-    start: Estimate | None
-    ratios: bool
 
 
 def locate(
@@ -79,7 +60,7 @@ def locate(
     crop : (xmin, xmax, ymin, ymax, zmin, zmax), optional
         Box in the camera frame, metres; only points inside are used.
     grid : float, optional
-        Side of the voxel grid's cells, m; 0.05 (step 1), or less for small clouds.
+        Side of the voxel grid's cells, m; `siloscope.estimation.steps.GRID` (step 1), or less for small clouds.
     neighbours : int
         Neighbours for normals and shape tensors (method ``shape-tensor``).
     threads : int
@@ -106,92 +87,16 @@ def locate(
     if run is None:
         raise UsageError(f"unknown method '{method}'; known are {', '.join(METHODS)}")
     profile = sensors.load(sensor)
-    settings = Settings(
+    settings = Settings.checked(
         profile,
-        _bounded("diameter", diameter, 0.01, 200.0),
-        _downwards(gravity),
-        _bounded("grid", grid, 1e-4, 10.0),
-        int(_whole("neighbours", neighbours, 6, 500)),
-        int(_whole("threads", threads, 1, 256)),
-        start,
-        ratios,
+        diameter=diameter,
+        gravity=gravity,
+        grid=grid,
+        neighbours=neighbours,
+        threads=threads,
+        start=start,
+        ratios=ratios,
     )
     prepared = prepare(data, camera, profile, depth_unit=depth_unit, mask=mask, crop=crop)
-    if settings.gravity is None and prepared.gravity is not None:
-        settings = replace(settings, gravity=_direction(prepared.gravity))
-    return run(prepared, settings, _config(method, prepared, settings))
-
-
-def _surface(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:
-    profile = CLOUD if isinstance(frame, PreparedPoints) else settings.profile
-    priors = Priors(profile, settings.diameter, settings.gravity)
-    if isinstance(frame, PreparedPoints):
-        return surface.fit_points(frame.points, priors, grid=settings.grid, threads=settings.threads, config=config)
-    start, ratios = settings.start, settings.ratios
-    return surface.fit_depth(frame.depth, frame.camera, priors, start=start, ratios=ratios, config=config)
-
-
-def _shape_tensor(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:
-    chosen = shape_tensor.Settings(grid=settings.grid, neighbours=settings.neighbours, threads=settings.threads)
-    if isinstance(frame, PreparedPoints):
-        return shape_tensor.fit_points(frame.points, chosen, config)
-    return shape_tensor.fit_depth(frame.depth, frame.camera, chosen, config)
-
-
-METHODS: dict[str, Callable[[Prepared, Settings, dict[str, Any]], Estimate]] = {
-    "surface": _surface,
-    "shape-tensor": _shape_tensor,
-}
-"""The methods by name."""
-
-
-def _config(method: str, prepared: Prepared, settings: Settings) -> dict[str, Any]:
-    """The effective settings, written beside every result."""
-    return {
-        "method": method,
-        "sensor": settings.profile.to_dict(),
-        "diameter": settings.diameter,
-        "gravity": None if settings.gravity is None else settings.gravity.tolist(),
-        "grid": settings.grid,
-        "neighbours": settings.neighbours,
-        "threads": settings.threads,
-        "camera": prepared.camera.to_dict() if isinstance(prepared, PreparedDepth) else None,
-        **prepared.config,
-    }
-
-
-def _bounded(name: str, value: Number, least: float, most: float) -> Number:
-    if value is None:
-        return None
-    if not is_number(value) or not least <= value <= most:
-        raise UsageError(f"{name} must be between {least:g} and {most:g} m, got {value}")
-    return float(value)
-
-
-def _whole(name: str, value: float, least: int, most: int) -> float:
-    if not is_number(value) or not least <= value <= most or value != int(value):
-        raise UsageError(f"{name} must be a whole number between {least} and {most}, got {value}")
-    return value
-
-
-def _downwards(gravity: ArrayLike | None) -> NDArray[np.float64] | None:
-    """Gravity as a caller gives it, who may mistake an accelerometer's reading for it."""
-    vector = _direction(gravity)
-    if vector is not None and vector[2] < 0.0:
-        raise UsageError(
-            f"gravity {vector.tolist()} points out of the camera's back; an accelerometer at rest reads minus gravity: "
-            "turn all three signs"
-        )
-    return vector
-
-
-def _direction(gravity: ArrayLike | None) -> NDArray[np.float64] | None:
-    if gravity is None:
-        return None
-    try:
-        vector = np.asarray(gravity, np.float64)
-    except (TypeError, ValueError):
-        vector = np.empty(0)
-    if vector.shape != (3,) or not (np.abs(vector) < 1e100).all() or not np.linalg.norm(vector) > 0:
-        raise UsageError(f"gravity must be three numbers, not all zero, got {gravity}")
-    return vector
+    settings = settings.with_gravity_of(prepared)
+    return run(prepared, settings, settings.effective(method, prepared))

@@ -3,36 +3,33 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from os import PathLike
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from siloscope import _core, sensors
+from siloscope import sensors
 from siloscope.calibrate import calibrate
 from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density, choose
 from siloscope.content.extras import with_vessel, without_obstacles
-from siloscope.content.knowledge import WALL_STD, Knowledge, filled_to, know, narrowed
-from siloscope.content.reading import Request, content_of, lengths_for_core, refused, source_of
-from siloscope.errors import InputError, UsageError
-from siloscope.estimation.inputs import Prepared, PreparedPoints, prepare
+from siloscope.content.fitting import cut_behind_bare_wall, fitted
+from siloscope.content.knowledge import camera_of, filled_to, know
+from siloscope.content.reading import Request, content_of, refused, unlocated
+from siloscope.errors import UsageError
+from siloscope.estimation.inputs import prepare
 from siloscope.locate import locate
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
 from siloscope.types.camera import Camera
 from siloscope.types.content import Content
-from siloscope.types.depth_frame import DepthFrame
 from siloscope.types.frame import Frame
-from siloscope.vessel.datasheet import LONGEST, Datasheet
+from siloscope.vessel.datasheet import LONGEST
 from siloscope.vessel.floor import STEEPEST_REPOSE
 from siloscope.vessel.vessel import Vessel, given
 
-BEHIND = 1.5
-"""Cells behind the farthest one that shows the bare cone at which a cone without an end is cut off."""
+ALONE = "pose and silo from this frame alone, without a calibration"
+"""What is assumed where no calibration is given."""
 
 
 def measure(
@@ -119,10 +116,16 @@ def measure(
     table = strapping if isinstance(strapping, Strapping | None) else Strapping.read(strapping)
     profile = None if sensor is None else sensors.load(sensor)
     steepest = STEEPEST_REPOSE if chosen is None else chosen.steepest
-    known, located = _known(data, calibration, camera, profile, depth_unit, sheet, top, mask, steepest)
-    if isinstance(known, Content):
-        return known
-    prepared = prepare(data, _camera(data, camera, located), profile or sensors.UNKNOWN,
+    if calibration is None:
+        estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask)
+        if not estimate.ok:
+            return unlocated(data, estimate)
+        silo = calibrate([estimate], sensor=profile, diameter=sheet.diameter)
+        known = know(silo, profile, sheet, top, None, steepest).assuming(ALONE)
+    else:
+        silo = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
+        known = know(silo, profile, sheet, top, sheet.diameter, steepest)
+    prepared = prepare(data, camera_of(data, camera, silo), profile or sensors.UNKNOWN,
                        depth_unit=depth_unit, mask=mask)  # fmt: skip
     ready = time.perf_counter()
     known = filled_to(known, about)
@@ -130,93 +133,9 @@ def measure(
         return refused("radius-unknown", "no cylinder is seen", data, known)
     prepared = without_obstacles(prepared, known, about)
     if known.lengths.cone_only:
-        known = _closer(prepared, known, sheet, located)
-    found, surface = _run(prepared, known, sheet)
+        known = cut_behind_bare_wall(prepared, known, sheet, silo)
+    found, surface = fitted(prepared, known, sheet)
     done = time.perf_counter()
     request = Request(data, known, sheet, table, chosen, previous, calibration is None)
     times = {"prepare": 1e3 * (ready - start), "measure": 1e3 * (done - ready)}
     return with_vessel(content_of(request, found, surface, {**prepared.config, **known.config}, times), about)
-
-
-def _known(
-    data: Frame | ArrayLike,
-    calibration: Calibration | str | PathLike[str] | None,
-    camera: Camera | None,
-    profile: SensorProfile | None,
-    depth_unit: float | None,
-    sheet: Datasheet,
-    top: float | None,
-    mask: ArrayLike | None,
-    steepest: float,
-) -> tuple[Knowledge | Content, Calibration]:
-    """Pose and silo: from the calibration, or from the frame itself."""
-    if calibration is not None:
-        silo = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
-        return know(silo, profile, sheet, top, sheet.diameter, steepest), silo
-    estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask)
-    if not estimate.ok:
-        reason, message = estimate.reason, f"{estimate.message} A calibration (--calibration) would do without."
-        return Content("refused", reason, message, source=source_of(data), config=estimate.config), Calibration(
-            "refused"
-        )
-    fused = calibrate([estimate], sensor=profile, diameter=sheet.diameter)
-    known = know(fused, profile, sheet, top, None, steepest)
-    said = ("pose and silo from this frame alone, without a calibration", *known.assumed)
-    return replace(known, assumed=said), fused
-
-
-def _camera(data: Frame | ArrayLike, camera: Camera | None, calibration: Calibration) -> Camera | None:
-    """The caller's camera, else the frame's own, else the calibration's."""
-    if camera is not None or (isinstance(data, Frame) and (data.camera is not None or data.points is not None)):
-        return camera
-    table = calibration.config.get("camera")
-    try:
-        return None if table is None else Camera(**{**table, "distortion": tuple(table["distortion"])})
-    except (TypeError, KeyError, ValueError):
-        raise InputError("the calibration's camera is damaged; give --camera FILE") from None
-
-
-def _inputs(
-    prepared: Prepared, known: Knowledge, sheet: Datasheet
-) -> tuple[DepthFrame | NDArray[np.float32], _core.ContentSetup]:
-    """What the core takes."""
-    data = (
-        np.asarray(prepared.points, np.float32)
-        if isinstance(prepared, PreparedPoints)
-        else DepthFrame.of(prepared.depth, prepared.camera)
-    )
-    setup = _core.ContentSetup(
-        (known.pose.r_x, known.pose.r_y, known.pose.t_x, known.pose.t_y), lengths_for_core(known, sheet),
-        known.covariance, WALL_STD, known.bias, known.noise, known.noise_known, known.range,
-    )  # fmt: skip
-    return data, setup
-
-
-def _run(prepared: Prepared, known: Knowledge, sheet: Datasheet) -> tuple[dict[str, Any], _core.ContentSurface | None]:
-    """The core's answer."""
-    try:
-        return _core.content_measure(*_inputs(prepared, known, sheet))
-    except ValueError as error:
-        raise UsageError(str(error)) from None
-
-
-def _closer(prepared: Prepared, known: Knowledge, sheet: Datasheet, calibration: Calibration) -> Knowledge:
-    """A cone of which nobody knows where it ends, cut off behind the farthest bare wall, so that the map fits it."""
-    radius = known.lengths.geometry.radius
-    try:
-        bare = _core.content_bare_reach(*_inputs(_every_other(prepared), known, sheet))
-    except ValueError as error:
-        raise UsageError(str(error)) from None
-    if bare is None or radius is None:
-        return known
-    farthest, cell = bare
-    return narrowed(known, calibration, min(farthest + BEHIND * cell, radius))
-
-
-def _every_other(prepared: Prepared) -> Prepared:
-    """Every other row and column of a depth image: enough to see how far the bare wall reaches."""
-    if isinstance(prepared, PreparedPoints):
-        return prepared
-    few, camera = prepared.depth[::2, ::2], prepared.camera
-    (height, width), halves = few.shape, {name: getattr(camera, name) / 2 for name in ("fx", "fy", "cx", "cy")}
-    return replace(prepared, depth=few, camera=replace(camera, width=width, height=height, **halves))

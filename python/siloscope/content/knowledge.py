@@ -7,15 +7,17 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from siloscope import sensors
 from siloscope.content.capacity import complete, lacking
 from siloscope.errors import InputError, UsageError
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
+from siloscope.types.camera import Camera
 from siloscope.types.content import Remark
 from siloscope.types.floor import Floor
+from siloscope.types.frame import Frame
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import Lengths, SiloGeometry
 from siloscope.vessel.datasheet import LENGTH_STD, Datasheet
@@ -57,6 +59,10 @@ class Knowledge:
     """What a volume needs and nobody knows, in the words of the options."""
     remarks: tuple[Remark, ...] = ()
     """Contradictions between what was given and what was seen."""
+
+    def assuming(self, what: str) -> Knowledge:
+        """The same, with something that was taken for granted before the rest."""
+        return replace(self, assumed=(what, *self.assumed))
 
 
 def know(
@@ -294,3 +300,14 @@ def _other_joint(calibration: Calibration, sheet: Datasheet, top: float | None) 
         return ()
     numbers = f"top and cylinder put the cylinder's bottom at {top + sheet.cylinder:.3f} m, it is seen at {seen:.3f} m"
     return (Remark("vessel-contradicted", f"{numbers}, which counts"),)
+
+
+def camera_of(data: Frame | ArrayLike, camera: Camera | None, calibration: Calibration) -> Camera | None:
+    """The caller's camera, else the frame's own, else the calibration's."""
+    if camera is not None or (isinstance(data, Frame) and (data.camera is not None or data.points is not None)):
+        return camera
+    table = calibration.config.get("camera")
+    try:
+        return None if table is None else Camera(**{**table, "distortion": tuple(table["distortion"])})
+    except (TypeError, KeyError, ValueError):
+        raise InputError("the calibration's camera is damaged; give --camera FILE") from None

@@ -46,12 +46,11 @@ def volume_over(
     core: _core.ContentSurface,
     found: dict[str, Any],
     known: Knowledge,
+    floor: FloorMap,
     silo: tuple[float, ...],
     wall_std: float,
 ) -> OverFloor:
-    """The content between a surface and `known.floor.map`."""
-    floor = known.floor.map
-    assert floor is not None
+    """The content between a surface and a floor that is known as a map."""
     x, y, area = _places(silo[0], silo[6:8])
     bottom, surface = floor.at(floor.z, x, y), core.z_at(np.column_stack([x, y]))
     thickness = bottom - surface

@@ -13,12 +13,13 @@ from siloscope import _core
 from siloscope.content import quality
 from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density
+from siloscope.content.fitting import lengths_for_core
 from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge
 from siloscope.content.over_floor import OverFloor, volume_over
 from siloscope.content.ullage import Ullage, ullage_of
-from siloscope.errors import InputError, UsageError
 from siloscope.reasons import CONTENT_REMARKS, sentence
 from siloscope.types.content import Content, Level, Parts, Remark
+from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
 from siloscope.types.surface_map import Shape, SurfaceMap
 from siloscope.vessel.datasheet import Datasheet
@@ -32,9 +33,6 @@ STRAY = 0.02
 
 DETECTABLE = 3.0
 """A heap on the vertex lower than so many standard deviations of a cell's thickness goes unseen."""
-
-BOTTOMLESS = 100.0
-"""How far below the camera the floor is put while nobody knows it, m: everything seen then is content."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +102,10 @@ def _over(
     free: Ullage | None,
 ) -> OverFloor | None:
     """The content over a floor that is known as a map; None where it is not, or no surface was found."""
-    if request.known.floor.map is None or core is None or free is None:
+    floor = request.known.floor.map
+    if floor is None or core is None or free is None:
         return None
-    return volume_over(core, found, request.known, silo, WALL_STD)
+    return volume_over(core, found, request.known, floor, silo, WALL_STD)
 
 
 def _with_total(found: dict[str, Any], over: OverFloor | None, free: Ullage | None) -> dict[str, Any]:
@@ -323,31 +322,12 @@ def _config(request: Request) -> dict[str, Any]:
     }
 
 
+def unlocated(data: Frame | ArrayLike, estimate: Estimate) -> Content:
+    """The answer where no calibration is given and the frame does not show the silo's axis."""
+    message = f"{estimate.message} A calibration (--calibration) would do without."
+    return Content("refused", estimate.reason, message, source=source_of(data), config=estimate.config)
+
+
 def source_of(data: Frame | ArrayLike) -> str:
     """Name of the frame."""
     return data.source if isinstance(data, Frame) else "frame"
-
-
-def lengths_for_core(known: Knowledge, sheet: Datasheet) -> tuple[float, ...]:
-    """Lengths as the core takes them; a floor that nobody knows is put out of sight."""
-    geometry = known.lengths.geometry
-    if geometry.radius is None:
-        raise InputError(
-            "the calibration has not seen the cylinder, so the silo's radius is not known; give --diameter, or "
-            "calibrate with frames of a lower level"
-        )
-    bottom, apex = geometry.cylinder_bottom, geometry.apex
-    if bottom is None or apex is None:
-        bottom = apex = BOTTOMLESS
-    if sheet.outlet_diameter >= 2.0 * geometry.radius:
-        raise UsageError(
-            f"an outlet of {sheet.outlet_diameter:g} m does not fit a silo of {2.0 * geometry.radius:.3f} m; "
-            "give --outlet-diameter in metres"
-        )
-    if known.lengths.top >= apex:
-        raise UsageError(
-            f"the upper edge at {known.lengths.top:g} m below the camera lies under the cone's vertex at {apex:.3f} m; "
-            "--top is negative above the camera"
-        )
-    outlet = sheet.outlet_diameter / 2.0
-    return geometry.radius, bottom, apex, known.lengths.top, outlet, sheet.outlet_length, *known.ovality

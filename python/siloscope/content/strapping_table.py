@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
+from siloscope.content.fitting import lengths_for_core
 from siloscope.content.knowledge import Knowledge
-from siloscope.content.reading import lengths_for_core
 from siloscope.errors import InputError
 from siloscope.types.floor import FloorMap
 from siloscope.vessel.vessel import Vessel

@@ -35,6 +35,7 @@ def decimated(data: Any, camera: Camera | None) -> Frame | None:
 
 @lru_cache(maxsize=4)
 def decimated_camera(camera: Camera) -> Camera:
+    """The camera that sees every second row and column of another."""
     return replace(
         camera,
         width=-(-camera.width // STEP),

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from siloscope import _core
 from siloscope.estimation import steps
-from siloscope.estimation.surface import cell_size, ratios_of, refused, timing_ms
+from siloscope.estimation.steps import cell_size
 from siloscope.types.camera import Camera
 from siloscope.types.depth_frame import DepthFrame
-from siloscope.types.estimate import Estimate
+from siloscope.types.estimate import Estimate, ratios_of, refused, timing_ms
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry
 
@@ -25,7 +25,7 @@ class Settings:
     """What the six steps leave to choose; see `siloscope.estimation.steps`."""
 
     grid: float | None = None
-    """Side of the voxels, m; None for `steps.GRID`, or less for small clouds (`surface.cell_size`)."""
+    """Side of the voxels, m; None for `steps.GRID`, or less for small clouds (`steps.cell_size`)."""
     neighbours: int = steps.NEIGHBOURS
     view: str = "auto"
     """One of `steps.VIEWS`, or "auto": the inside, and the others where that gives no axis."""

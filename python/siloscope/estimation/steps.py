@@ -321,3 +321,12 @@ def _view(view: str) -> str:
     if view not in VIEWS:
         raise UsageError(f"unknown view '{view}'; known are {', '.join(VIEWS)}")
     return view
+
+
+def cell_size(points: NDArray[np.float64]) -> float:
+    """Side of voxel cells for a cloud: the paper's 0.05 m, or a 60th of the cloud where it is small, in metres."""
+    finite = points[np.isfinite(points).all(axis=1)]
+    if len(finite) == 0:
+        return GRID
+    extent = float(np.max(np.percentile(finite, 95, axis=0) - np.percentile(finite, 5, axis=0)))
+    return min(GRID, extent / 60.0) if extent > 0.0 else GRID

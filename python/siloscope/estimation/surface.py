@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from siloscope import _core
 from siloscope.estimation.priors import DEPTH_BIAS, OVALITY, Priors
+from siloscope.estimation.steps import cell_size
 from siloscope.parameters import BIAS, PARAMETERS
-from siloscope.reasons import sentence
 from siloscope.types.camera import Camera
 from siloscope.types.depth_frame import DepthFrame
-from siloscope.types.estimate import Estimate, PixelLabels, Ratios, SurfaceDetails
+from siloscope.types.estimate import Estimate, PixelLabels, SurfaceDetails, ratios_of, refused, timing_ms
 from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import geometry_of
@@ -81,36 +81,6 @@ def fit_points(
     if isinstance(found, _core.Refusal):
         return refused("surface", found, config)
     return _estimate(found, priors, config)
-
-
-def cell_size(points: NDArray[np.float64]) -> float:
-    """Side of voxel cells for a cloud: the paper's 0.05 m, or a 60th of the cloud where it is small, in metres."""
-    finite = points[np.isfinite(points).all(axis=1)]
-    if len(finite) == 0:
-        return GRID
-    extent = float(np.max(np.percentile(finite, 95, axis=0) - np.percentile(finite, 5, axis=0)))
-    return min(GRID, extent / 60.0) if extent > 0.0 else GRID
-
-
-GRID = 0.05
-"""Side of the voxel grid's cells, m (step 1 of section 2.3)."""
-
-
-def refused(method: str, refusal: _core.Refusal, config: dict[str, Any] | None) -> Estimate:
-    """An estimate without an answer; the message says what the reason means and what to try."""
-    message = sentence((refusal.meaning, refusal.remedy))
-    return Estimate("refused", method, reason=refusal.slug, message=message, config=config or {})
-
-
-def timing_ms(stages: list[_core.StageTime]) -> dict[str, float]:
-    """Milliseconds of a method's stages by their names."""
-    return {stage.name.replace(" ", "_"): stage.ms for stage in stages}
-
-
-def ratios_of(sums: list[float]) -> Ratios | None:
-    """Shares of cylinder, cone and feed among everything seen; None where nothing is."""
-    seen = sum(sums[1:])
-    return Ratios(*(sums[label] / seen for label in (1, 2, 3))) if seen > 0 else None
 
 
 def _estimate(

@@ -114,7 +114,7 @@ PAIRS = 20_000
 def _steps(points: NDArray[np.float64], estimate: Estimate, pose: SiloPose) -> dict[str, Figure]:
     """Steps 3 and 4 of the paper on the frame's cloud; nothing where it is too small for them."""
     from siloscope.estimation import steps
-    from siloscope.estimation.surface import cell_size
+    from siloscope.estimation.steps import cell_size
     from siloscope.reporting import plots
 
     grid = estimate.config.get("grid") or cell_size(points)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
+from siloscope.reasons import sentence
 from siloscope.schema import ESTIMATE
 from siloscope.types.by_value import ByValue, same
 from siloscope.types.depth_frame import DepthFrame
@@ -169,3 +170,20 @@ class Estimate(ByValue):
             "config": self.config,
             "timing_ms": self.timing_ms,
         }
+
+
+def refused(method: str, refusal: _core.Refusal, config: dict[str, Any] | None) -> Estimate:
+    """An estimate without an answer; the message says what the reason means and what to try."""
+    message = sentence((refusal.meaning, refusal.remedy))
+    return Estimate("refused", method, reason=refusal.slug, message=message, config=config or {})
+
+
+def timing_ms(stages: list[_core.StageTime]) -> dict[str, float]:
+    """Milliseconds of a method's stages by their names."""
+    return {stage.name.replace(" ", "_"): stage.ms for stage in stages}
+
+
+def ratios_of(sums: list[float]) -> Ratios | None:
+    """Shares of cylinder, cone and feed among everything seen; None where nothing is."""
+    seen = sum(sums[1:])
+    return Ratios(*(sums[label] / seen for label in (1, 2, 3))) if seen > 0 else None

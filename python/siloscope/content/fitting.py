@@ -1,0 +1,96 @@
+"""The core's fit of the content's surface to a prepared frame."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from siloscope import _core
+from siloscope.content.knowledge import WALL_STD, Knowledge, narrowed
+from siloscope.errors import InputError, UsageError
+from siloscope.estimation.decimation import STEP, decimated_camera
+from siloscope.estimation.inputs import Prepared, PreparedPoints
+from siloscope.types.calibration import Calibration
+from siloscope.types.depth_frame import DepthFrame
+from siloscope.vessel.datasheet import Datasheet
+
+BEHIND = 1.5
+"""Cells behind the farthest one that shows the bare cone at which a cone without an end is cut off."""
+
+
+def _inputs(
+    prepared: Prepared, known: Knowledge, sheet: Datasheet
+) -> tuple[DepthFrame | NDArray[np.float32], _core.ContentSetup]:
+    """What the core takes."""
+    data = (
+        np.asarray(prepared.points, np.float32)
+        if isinstance(prepared, PreparedPoints)
+        else DepthFrame.of(prepared.depth, prepared.camera)
+    )
+    setup = _core.ContentSetup(
+        (known.pose.r_x, known.pose.r_y, known.pose.t_x, known.pose.t_y), lengths_for_core(known, sheet),
+        known.covariance, WALL_STD, known.bias, known.noise, known.noise_known, known.range,
+    )  # fmt: skip
+    return data, setup
+
+
+def fitted(
+    prepared: Prepared, known: Knowledge, sheet: Datasheet
+) -> tuple[dict[str, Any], _core.ContentSurface | None]:
+    """The core's answer."""
+    try:
+        return _core.content_measure(*_inputs(prepared, known, sheet))
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+
+
+def cut_behind_bare_wall(prepared: Prepared, known: Knowledge, sheet: Datasheet, calibration: Calibration) -> Knowledge:
+    """A cone of which nobody knows where it ends, cut off behind the farthest bare wall, so that the map fits it."""
+    radius = known.lengths.geometry.radius
+    try:
+        bare = _core.content_bare_reach(*_inputs(_every_other(prepared), known, sheet))
+    except ValueError as error:
+        raise UsageError(str(error)) from None
+    if bare is None or radius is None:
+        return known
+    farthest, cell = bare
+    return narrowed(known, calibration, min(farthest + BEHIND * cell, radius))
+
+
+def _every_other(prepared: Prepared) -> Prepared:
+    """Every other row and column of a depth image: enough to see how far the bare wall reaches."""
+    if isinstance(prepared, PreparedPoints):
+        return prepared
+    return replace(prepared, depth=prepared.depth[::STEP, ::STEP], camera=decimated_camera(prepared.camera))
+
+
+BOTTOMLESS = 100.0
+"""How far below the camera the floor is put while nobody knows it, m: everything seen then is content."""
+
+
+def lengths_for_core(known: Knowledge, sheet: Datasheet) -> tuple[float, ...]:
+    """Lengths as the core takes them; a floor that nobody knows is put out of sight."""
+    geometry = known.lengths.geometry
+    if geometry.radius is None:
+        raise InputError(
+            "the calibration has not seen the cylinder, so the silo's radius is not known; give --diameter, or "
+            "calibrate with frames of a lower level"
+        )
+    bottom, apex = geometry.cylinder_bottom, geometry.apex
+    if bottom is None or apex is None:
+        bottom = apex = BOTTOMLESS
+    if sheet.outlet_diameter >= 2.0 * geometry.radius:
+        raise UsageError(
+            f"an outlet of {sheet.outlet_diameter:g} m does not fit a silo of {2.0 * geometry.radius:.3f} m; "
+            "give --outlet-diameter in metres"
+        )
+    if known.lengths.top >= apex:
+        raise UsageError(
+            f"the upper edge at {known.lengths.top:g} m below the camera lies under the cone's vertex at {apex:.3f} m; "
+            "--top is negative above the camera"
+        )
+    outlet = sheet.outlet_diameter / 2.0
+    return geometry.radius, bottom, apex, known.lengths.top, outlet, sheet.outlet_length, *known.ovality

@@ -1,0 +1,113 @@
+"""What a caller asks of `locate`, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from siloscope.errors import UsageError
+from siloscope.estimation.inputs import Prepared, PreparedDepth
+from siloscope.sensors import SensorProfile
+from siloscope.types.camera import is_number
+from siloscope.types.estimate import Estimate
+
+Number = float | None
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What the caller asks for, checked."""
+
+    profile: SensorProfile
+    diameter: Number
+    gravity: NDArray[np.float64] | None
+    grid: Number
+    neighbours: int
+    threads: int
+    start: Estimate | None
+    ratios: bool
+
+    @classmethod
+    def checked(
+        cls,
+        profile: SensorProfile,
+        *,
+        diameter: Number,
+        gravity: ArrayLike | None,
+        grid: Number,
+        neighbours: int,
+        threads: int,
+        start: Estimate | None,
+        ratios: bool,
+    ) -> Settings:
+        """Raises `UsageError` for a setting outside its bounds."""
+        return cls(
+            profile,
+            _bounded("diameter", diameter, 0.01, 200.0),
+            _downwards(gravity),
+            _bounded("grid", grid, 1e-4, 10.0),
+            _whole("neighbours", neighbours, 6, 500),
+            _whole("threads", threads, 1, 256),
+            start,
+            ratios,
+        )
+
+    def with_gravity_of(self, prepared: Prepared) -> Settings:
+        """With the frame's own gravity where the caller gives none."""
+        if self.gravity is not None or prepared.gravity is None:
+            return self
+        return replace(self, gravity=_direction(prepared.gravity))
+
+    def effective(self, method: str, prepared: Prepared) -> dict[str, Any]:
+        """The effective settings, written beside every result."""
+        return {
+            "method": method,
+            "sensor": self.profile.to_dict(),
+            "diameter": self.diameter,
+            "gravity": None if self.gravity is None else self.gravity.tolist(),
+            "grid": self.grid,
+            "neighbours": self.neighbours,
+            "threads": self.threads,
+            "camera": prepared.camera.to_dict() if isinstance(prepared, PreparedDepth) else None,
+            **prepared.config,
+        }
+
+
+def _bounded(name: str, value: Number, least: float, most: float) -> Number:
+    if value is None:
+        return None
+    if not is_number(value) or not least <= value <= most:
+        raise UsageError(f"{name} must be between {least:g} and {most:g} m, got {value}")
+    return float(value)
+
+
+def _whole(name: str, value: float, least: int, most: int) -> int:
+    if not is_number(value) or not least <= value <= most or value != int(value):
+        raise UsageError(f"{name} must be a whole number between {least} and {most}, got {value}")
+    return int(value)
+
+
+def _downwards(gravity: ArrayLike | None) -> NDArray[np.float64] | None:
+    """Gravity as a caller gives it, who may mistake an accelerometer's reading for it."""
+    vector = _direction(gravity)
+    if vector is not None and vector[2] < 0.0:
+        raise UsageError(
+            f"gravity {vector.tolist()} points out of the camera's back; an accelerometer at rest reads minus gravity: "
+            "turn all three signs"
+        )
+    return vector
+
+
+def _direction(gravity: ArrayLike | None) -> NDArray[np.float64] | None:
+    if gravity is None:
+        return None
+    try:
+        vector = np.asarray(gravity, np.float64)
+    except (TypeError, ValueError):
+        vector = np.empty(0)
+    if vector.shape != (3,) or not (np.abs(vector) < 1e100).all() or not np.linalg.norm(vector) > 0:
+        raise UsageError(f"gravity must be three numbers, not all zero, got {gravity}")
+    return vector
