@@ -136,14 +136,35 @@ PLAIN = {
     "printed by an older one": "width: 320, height: 240, ppx: 161.5, ppy: 118.75, fx: 281.5, fy: 282.25, "
     "model: Brown Conrady, coeffs: [0.0, 0.0, 0.0, 0.0, 0.0]",
     "JSON of a detector": json.dumps({"K": MATRIX, "dist": [0, 0, 0, 0, 0]}),
+    "NeRF transforms": json.dumps({"fl_x": 281.5, "fl_y": 282.25, "cx": 161.5, "cy": 118.75, "w": 320, "h": 240}),
     "JSON without a size": json.dumps({"fx": 281.5, "fy": 282.25, "cx": 161.5, "cy": 118.75}),
     "BOP images": json.dumps(BOP_IMAGES),
     "BOP camera": json.dumps(BOP_CAMERA),
 }
+ORB_SLAM = """%YAML:1.0
+Camera.type: "PinHole"
+Camera.fx: 281.5
+Camera.fy: 282.25
+Camera.cx: 161.5
+Camera.cy: 118.75
+Camera.k1: 0.11
+Camera.k2: -0.21
+Camera.p1: 0.0015
+Camera.p2: -0.0005
+Camera.k3: 0.031
+Camera.width: 320
+Camera.height: 240
+Camera.fps: 30.0
+DepthMapFactor: 5000.0
+"""
 LENSES = {
     "OpenCV YAML": OPENCV_YAML,
     "OpenCV YAML, older": OPENCV_YAML.replace("---\n", "").replace("camera_matrix", "CameraMat"),
     "OpenCV XML": OPENCV_XML,
+    "ORB-SLAM": ORB_SLAM,
+    "ORB-SLAM3": ORB_SLAM.replace("Camera.", "Camera1.")
+    .replace("Camera1.width", "Camera.width")
+    .replace("Camera1.height", "Camera.height"),
     "JSON in OpenCV's names": json.dumps({"cameraMatrix": MATRIX, "distCoeffs": [list(K5)]}),
     "OAK calibration": json.dumps(DEPTHAI),
     "stereo pair": OPENCV_YAML.replace("camera_matrix", "M1").replace("distortion_coefficients", "D1"),

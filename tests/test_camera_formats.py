@@ -23,6 +23,7 @@ from camera_texts import (
     MATRIX,
     OPENCV_XML,
     OPENCV_YAML,
+    ORB_SLAM,
     PLAIN,
     RECORD3D,
     SENSOR_INFO,
@@ -91,7 +92,8 @@ def test_phones_hand_on_the_intrinsics_of_the_colour_image() -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "unit"), [(json.dumps(BOP_IMAGES), 1e-4), (json.dumps(BOP_CAMERA), 1e-3), (SENSOR_INFO, 1e-3)]
+    ("text", "unit"),
+    [(json.dumps(BOP_IMAGES), 1e-4), (json.dumps(BOP_CAMERA), 1e-3), (SENSOR_INFO, 1e-3), (ORB_SLAM, 2e-4)],
 )
 def test_units_of_datasets(text: str, unit: float) -> None:
     assert camera_files.parse("camera", text).depth_unit == pytest.approx(unit)

@@ -20,7 +20,7 @@ def from_document(name: str, document: Any, *, calibration: bool = False) -> Cam
     """The cameras and unit of a document; raises `InputError` naming the field that can't be used."""
     if not isinstance(document, Mapping):
         return from_fields(name, document)
-    layouts: tuple[Callable[[str, Fields], list[Any]], ...] = (_kalibr, _stereo, _bop_images, _depthai)
+    layouts: tuple[Callable[[str, Fields], list[Any]], ...] = (_kalibr, _stereo, _orb_slam, _bop_images, _depthai)
     several = next((found for layout in layouts if (found := layout(name, document))), None)
     if several is None:
         return from_fields(name, document, calibration=calibration or "dw" in document)  # Record3D's depth is smaller
@@ -60,6 +60,19 @@ def _stereo(name: str, document: Fields) -> list[Any]:
     size = {key: document[key] for key in ("image_width", "image_height") if key in document}
     pairs = [(document.get(f"M{i}"), document.get(f"D{i}", [])) for i in (1, 2)]
     return [{**size, "camera_matrix": m, "dist": d} for m, d in pairs if isinstance(m, Mapping | list)]
+
+
+def _orb_slam(name: str, document: Fields) -> list[Any]:
+    """ORB-SLAM's settings: ``Camera.fx``, or ``Camera1.fx``, with the depth's units a metre as ``DepthMapFactor``."""
+    prefix = next((prefix for prefix in ("Camera.", "Camera1.") if f"{prefix}fx" in document), None)
+    if prefix is None:
+        return []
+    camera = {key.removeprefix(prefix): value for key, value in document.items() if str(key).startswith(prefix)}
+    size = {key: document[f"Camera.{key}"] for key in ("width", "height") if f"Camera.{key}" in document}
+    units = [document[key] for key in ("DepthMapFactor", "RGBD.DepthMapFactor") if key in document]
+    fisheye = document.get("Camera.type") == "KannalaBrandt8"
+    known = {**camera, **size, "distortion_model": "equidistant" if fisheye else "plumb_bob"}
+    return [known | ({"depth_scale": units[0]} if units else {})]
 
 
 def _bop_images(name: str, document: Fields) -> list[Any]:

@@ -18,8 +18,8 @@ from siloscope.types.camera import Camera
 _FIELD_NAMES = {
     "width": ("width", "image_width", "w"),
     "height": ("height", "image_height", "h"),
-    "fx": ("fx", "focal_x"),
-    "fy": ("fy", "focal_y"),
+    "fx": ("fx", "focal_x", "fl_x"),
+    "fy": ("fy", "focal_y", "fl_y"),
     "cx": ("cx", "ppx"),
     "cy": ("cy", "ppy"),
 }
