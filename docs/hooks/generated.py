@@ -94,7 +94,9 @@ def sensors() -> str:
 
 def bottom_evidence() -> str:
     """How a bottom is known."""
-    rows = [f"| `{name}` | {meaning} |" for name, meaning in reasons.BOTTOM_EVIDENCE.items()]
+    from siloscope.reasons import BOTTOM_EVIDENCE
+
+    rows = [f"| `{name}` | {meaning} |" for name, meaning in BOTTOM_EVIDENCE.items()]
     return "\n".join(("| evidence | the bottom is known from |", "|---|---|", *rows))
 
 
