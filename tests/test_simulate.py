@@ -154,3 +154,73 @@ def test_the_camera_that_is_told_is_off_by_its_deviations(tmp_path: Path) -> Non
     assert scene["camera"]["fx"] == true_camera(told, "calibrated", 3).fx != told.fx
     assert scene["sensor"]["multipath"] == 0.1
     assert main(["simulate", "--out", str(tmp_path / "no"), "--intrinsics", "guessed", *SMALL]) == 2
+
+
+VESSEL = """
+name = "bin 7"
+diameter = 3.0
+cylinder = 4.2
+fill_height = 4.0
+top = -0.1
+
+[bottom]
+{bottom}
+
+[[course]]
+bottom = 2.8
+diameter = 3.01
+
+[roof]
+height = 0.7
+
+[[obstacle]]
+name = "beam"
+start = [-1.4, 0.3, 2.2]
+end = [1.4, 0.3, 2.2]
+diameter = 0.1
+"""
+
+
+@pytest.mark.parametrize(
+    ("bottom", "below"),
+    [
+        ('kind = "oblique"\nheight = 1.8\nvertex = [0.4, 0.1]\noutlet = 0.3', 1.8 / 3.0),
+        ('kind = "two-stage"\nheight = 1.8\nupper = 0.8\nwaist = 1.2', (0.8 * (1.0 + 0.4 + 0.16) + 0.16) / 3.0),
+        ('kind = "pyramid"\nheight = 1.8\nazimuth = 30', 1.8 * (1.0 - 4.0 * math.sqrt(2.0) / (3.0 * math.pi))),
+        ('kind = "flat"', 0.0),
+    ],
+)
+def test_a_vessel_is_read_from_its_file(tmp_path: Path, bottom: str, below: float) -> None:
+    """Capacity and ullage are those of the datasheet, by formulas of their own."""
+    file, out = tmp_path / "vessel.toml", tmp_path / "frames"
+    file.write_text(VESSEL.format(bottom=bottom))
+    options = ["--vessel", str(file), "--feed", "crater", "--level", "0.5", "--labels", *SMALL]
+    assert main(["simulate", "--out", str(out), *options]) == 0
+    document = json.loads((out / "truth.json").read_text())
+    frame, labels = document["frames"][0], np.asarray(Image.open(out / "labels" / "frame_0000.png"))
+    capacity = math.pi * (1.5**2 * (2.8 + below) + 1.505**2 * 1.4)
+    assert frame["capacity_m3"] == pytest.approx(capacity, rel=1e-9)
+    unfilled = math.pi * 1.505**2 * 0.2
+    assert frame["ullage_m3"] == pytest.approx(capacity - unfilled - frame["volume_m3"], rel=1e-6)
+    assert (labels == 4).any(), "the beam is in view"
+    assert frame["silo"]["cylinder_bottom"] == pytest.approx(4.1)
+    assert frame["silo"]["apex"] == (None if "flat" in bottom else pytest.approx(5.9))
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        (("diameter = 3.0\n", ""), "diameter"),
+        (('kind = "flat"', 'kind = "wedge"\nheight = 1.0'), "wedge"),
+        (('kind = "flat"', 'kind = "cone"'), "height"),
+        (("top = -0.1", "outline = [[0, 0], [1, 0], [1, 1]]"), "outline"),
+    ],
+)
+def test_a_vessel_that_cannot_be_simulated_is_named(
+    tmp_path: Path, change: tuple[str, str], named: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "vessel.toml"
+    file.write_text(VESSEL.format(bottom='kind = "flat"').replace(*change))
+    assert main(["simulate", "--out", str(tmp_path / "out"), "--vessel", str(file), *SMALL]) == 2
+    assert named in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

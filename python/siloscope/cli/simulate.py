@@ -15,8 +15,11 @@ from siloscope.cli.outcome import print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.errors import UsageError
 from siloscope.io import camera_files, writers
+from siloscope.schema import vessel as vessels
+from siloscope.schema.vessel import VesselFile
 from siloscope.simulation import DEFECTS, Feed, Scene, SimulatedFrame, defects, discharge, sensor_model, true_camera
-from siloscope.simulation.scenarios import SCENARIOS, scenario
+from siloscope.simulation.scenarios import SCENARIOS, looking_at, scenario
+from siloscope.simulation.vessels import defects_of, silo_of, ullage
 from siloscope.types.camera import Camera
 from siloscope.types.pose import SiloPose
 from siloscope.wording import counted
@@ -27,6 +30,7 @@ MOST_STEPS = 100_000
 PERFECT_UNIT = 0.00025
 """Metres per raw unit where no sensor names one: fine for a perfect silo, and 16 bits still reach 16 m."""
 
+_VESSEL = "Vessel file (TOML) in place of the scenario's silo: diameter, courses, bottom, outlet, roof, obstacles."
 _INTRINSICS = "How well camera.json is known: exact, calibrated or nominal; the true camera is drawn and in truth.json."
 _MULTIPATH = "Share of the light that surfaces throw back, for a ToF sensor: 0 to 1."
 _SCENARIO = f"Silo, camera and pose to start from: {', '.join(SCENARIOS)}."
@@ -39,6 +43,7 @@ _DEFECTS = f"Real walls and clutter, joined by commas: {', '.join(DEFECTS)}; or 
 def simulate(
     out: Annotated[Path, typer.Option(help="Folder to write into; made where it is missing, else it must be empty.")],
     scenario_name: Annotated[str, typer.Option("--scenario", help=_SCENARIO)] = "silo1",
+    vessel_file: Annotated[Path | None, typer.Option("--vessel", help=_VESSEL)] = None,
     radius: Annotated[float | None, typer.Option(help="Radius of the cylinder, m.")] = None,
     cylinder: Annotated[float | None, typer.Option(help="Height of the cylinder, m.")] = None,
     cone: Annotated[float | None, typer.Option(help="Height of the cone, m.")] = None,
@@ -76,9 +81,13 @@ def simulate(
     [bold]Example:[/bold] siloscope simulate --scenario silo2 --sensor astra-s --steps 100 --out discharge
 
     The folder gets frame_0000.png and so on, camera.json (with the depth unit), and truth.json: pose, geometry, feed
-    volume and ratios of every frame. Labels are 0 none, 1 cylinder, 2 cone, 3 feed, 4 other.
+    volume and ratios of every frame, with --vessel also the ullage. Labels are 0 none, 1 cylinder, 2 cone (any bottom),
+    3 feed, 4 other.
     """
     scene = scenario(scenario_name)
+    vessel = None if vessel_file is None else vessels.read(vessel_file)
+    if vessel is not None:
+        scene = _placed(scene, vessel)
     silo = _given(radius=radius, cylinder_height=cylinder, cone_height=cone, outlet_radius=outlet)
     if outlet_offset is not None:
         silo["outlet_offset"] = tuple(_numbers("--outlet-offset", outlet_offset, "x,y in metres", 2))
@@ -95,7 +104,7 @@ def simulate(
     scene = replace(scene, camera=true_camera(told, known, seed), told=None if known == "exact" else told)
     scenes = _scenes(scene, steps, level)
     unit = None if exact else _unit(depth_unit, sensor)
-    document = _write(scenes, out, unit, labels, threads)
+    document = _write(scenes, out, unit, labels, threads, vessel)
     if as_json:
         print_json(document)
     else:
@@ -165,14 +174,25 @@ def _unit(depth_unit: float | None, sensor: str | None) -> float:
     return PERFECT_UNIT if sensor in (None, "perfect") else 1e-3
 
 
-def _write(scenes: list[Scene], out: Path, unit: float | None, labels: bool, threads: int) -> dict[str, Any]:
+def _placed(scene: Scene, vessel: VesselFile) -> Scene:
+    """The scene in another vessel: the camera is 0.6 radii off the axis and looks at the lowest point."""
+    silo = silo_of(vessel)
+    pose = looking_at(silo, 0.6 * silo.radius, 0.1 * silo.radius)
+    return replace(scene, silo=silo, pose=pose, defects=defects_of(vessel, silo))
+
+
+def _write(
+    scenes: list[Scene], out: Path, unit: float | None, labels: bool, threads: int, vessel: VesselFile | None
+) -> dict[str, Any]:
     _check_empty(out)
     frames = []
     for index, scene in enumerate(track(scenes, "simulating")):
         frame = scene.render(threads)  # a scene that can't be is refused before anything is written
         with writing(out):
             (out / "labels" if labels else out).mkdir(parents=True, exist_ok=True)
-            frames.append(_write_frame(frame, out, f"frame_{index:04d}", unit, labels))
+            entry = _write_frame(frame, out, f"frame_{index:04d}", unit, labels)
+            free = {} if vessel is None else {"ullage_m3": ullage(vessel, scene.silo, frame.true_volume)}
+            frames.append({**entry, **free})
     document = _document(scenes[0], unit, frames)
     with writing(out):
         camera_files.dump(scenes[0].told or scenes[0].camera, out / "camera.json", unit)

@@ -7,6 +7,7 @@ from siloscope.simulation.intrinsics import PRIORS, true_camera
 from siloscope.simulation.scene import ASTRA, WORLDS, Scene, SimulatedFrame, discharge
 from siloscope.simulation.sensor_model import ASTRA_S, PERFECT, SensorModel, sensor_model
 from siloscope.simulation.silo import Silo
+from siloscope.simulation.vessels import defects_of, silo_of, ullage
 
 __all__ = [
     "ALL",
@@ -27,7 +28,10 @@ __all__ = [
     "SimulatedFrame",
     "content_of",
     "defects",
+    "defects_of",
     "discharge",
     "sensor_model",
+    "silo_of",
     "true_camera",
+    "ullage",
 ]
