@@ -3,33 +3,24 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
-from hashlib import blake2b
-from itertools import islice
+from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from os import PathLike
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from siloscope.content.reading import with_movement
 from siloscope.errors import InputError, UsageError
 from siloscope.io import FrameSource
 from siloscope.io.given import given_frames
 from siloscope.measure import measure
 from siloscope.tracking.clock import Clock
-from siloscope.tracking.story import reading_of, track_of
+from siloscope.tracking.sequence import in_order, measured, stored
+from siloscope.tracking.story import track_of
 from siloscope.types.calibration import Calibration
-from siloscope.types.content import Content
 from siloscope.types.frame import Frame
-from siloscope.types.track import Reading, Track
+from siloscope.types.track import Track
 
 MOST_JOBS = 256
 
-TOGETHER = 120.0
-"""Seconds between two frames that still tell whether the content moves while they are taken."""
 
 LONGEST_INTERVAL = 1e7
 """Seconds between frames without a time of their own: some months."""
@@ -88,97 +79,11 @@ def track(
     silo = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
     earlier = () if continue_from is None else stored(continue_from)
     source = given_frames(frames)
-    readings, last = _measured(
-        progress(source) if progress else source, silo, Clock(interval, start), settings, earlier, jobs
-    )
+    shown = progress(source) if progress else source
+    one = partial(measure, calibration=silo, **settings)
+    readings, last = measured(shown, one, Clock(interval, start), earlier, jobs)
     problems = tuple(source.problems) if isinstance(source, FrameSource) else ()
     if all(reading.status == "unreadable" for reading in readings):
         causes = (*(str(reading.reason) for reading in readings), *problems, "give at least one")
         raise InputError(f"no frame could be used; {causes[0]}")
     return track_of(in_order([*earlier, *readings]), last, problems, name=name)
-
-
-def stored(track: Track | Pathlike) -> tuple[Reading, ...]:
-    """The readings of an earlier track, or of the file that it wrote.
-
-    Raises
-    ------
-    InputError
-        For a file that is no track.
-    """
-    if isinstance(track, Track):
-        return tuple(reading for reading in track.readings if reading.status != "unreadable")
-    from siloscope.schema.track import read
-
-    return tuple(Reading(**entry) for entry in read(Path(track)) if entry["status"] != "unreadable")
-
-
-def in_order(readings: Sequence[Reading]) -> list[Reading]:
-    """Readings by their time where all have one, else as they came; numbered anew."""
-    if all(reading.time is not None for reading in readings):
-        readings = sorted(readings, key=lambda reading: reading.time or 0.0)
-    return [replace(reading, index=index) for index, reading in enumerate(readings)]
-
-
-def _measured(
-    frames: Iterable[Frame],
-    silo: Calibration,
-    clock: Clock,
-    settings: dict[str, Any],
-    earlier: Sequence[Reading],
-    jobs: int,
-) -> tuple[list[Reading], Content | None]:
-    """New readings, each frame once, and the last answer with its surface."""
-    seen = {reading.digest for reading in earlier if reading.digest is not None}
-    readings: list[Reading] = []
-    before: tuple[float | None, Content] | None = None
-    last: Content | None = None
-    for index, (frame, digest, content) in enumerate(_contents(frames, silo, settings, jobs)):
-        if digest in seen:
-            continue
-        seen.add(digest)
-        time = clock.time(index, frame.timestamp, frame.source)
-        if before is not None and _together(before[0], time):
-            content = with_movement(content, before[1])
-        readings.append(reading_of(len(earlier) + len(readings), time, content, digest))
-        if content.ok:
-            before, last = (time, replace(content, surface=None)), content
-    return readings, last
-
-
-def _contents(
-    frames: Iterable[Frame], silo: Calibration, settings: dict[str, Any], jobs: int
-) -> Iterator[tuple[Frame, str, Content]]:
-    """Frames with their hash and content in their order, some measured at a time."""
-
-    def one(frame: Frame) -> tuple[Frame, str, Content]:
-        try:
-            content = measure(frame, silo, **settings)
-        except InputError as error:
-            content = Content("unreadable", message=str(error), source=frame.source)
-        kept = Frame(timestamp=frame.timestamp, source=frame.source)
-        return kept, digest_of(frame), content
-
-    if jobs == 1:
-        yield from map(one, frames)
-        return
-    with ThreadPoolExecutor(jobs) as pool:
-        for some in batched(frames, 2 * jobs):
-            yield from pool.map(one, some)
-
-
-def batched(frames: Iterable[Frame], size: int) -> Iterator[tuple[Frame, ...]]:
-    """Frames in tuples of a size."""
-    source = iter(frames)
-    while some := tuple(islice(source, size)):
-        yield some
-
-
-def digest_of(frame: Frame) -> str:
-    """Hash of a frame's measurements, whatever its file is called."""
-    values = frame.depth if frame.depth is not None else frame.points
-    return blake2b(b"" if values is None else np.ascontiguousarray(values).tobytes(), digest_size=16).hexdigest()
-
-
-def _together(before: float | None, now: float | None) -> bool:
-    return before is not None and now is not None and 0.0 <= now - before <= TOGETHER

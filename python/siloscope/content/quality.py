@@ -32,8 +32,6 @@ EXPLAINED = 0.5
 """Share of the wall's mean square distance that the move must take away; feed on the wall looks like a move, too."""
 MATTERS = 3.0
 """A move of the camera refuses the reading where it changes the volume by so many standard deviations."""
-MOVING = 4.0
-"""Standard deviations of the difference between two frames' volumes that is a movement."""
 
 
 def remarks(found: dict[str, Any], coverage: float | None, capacity: float | None, area: float) -> list[Remark]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge
 from siloscope.content.over_floor import OverFloor, volume_over
 from siloscope.content.ullage import Ullage, ullage_of
 from siloscope.reasons import CONTENT_REMARKS, sentence
-from siloscope.types.content import Content, Level, Parts, Remark
+from siloscope.types.content import Content, Level, Parts, Remark, with_movement
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
 from siloscope.types.surface_map import Shape, SurfaceMap
@@ -294,16 +294,6 @@ def _columns(surface: SurfaceMap | None, silo: tuple[float, ...]) -> NDArray[np.
     floor = np.minimum((apex - bottom) * across / radius, apex - bottom)
     rise = np.where(surface.inside, surface.heights - floor, 0.0)
     return np.asarray(rise[rise > 0.0])
-
-
-def with_movement(now: Content, previous: Content | None) -> Content:
-    """With the remark that the content moved since the frame before, where it did."""
-    change = None if previous is None else now.change_since(previous)
-    if change is None or abs(change[0]) <= quality.MOVING * change[1]:
-        return now
-    return replace(
-        now, quality=(*now.quality, Remark("filling-in-progress", f"{change[0]:+.3f} m³ since the frame before"))
-    )
 
 
 def _config(request: Request) -> dict[str, Any]:

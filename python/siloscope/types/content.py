@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -91,6 +91,9 @@ class Parts:
         """Plain data."""
         return {name: getattr(self, name) for name in self.__dataclass_fields__}
 
+
+MOVING = 4.0
+"""Standard deviations of the difference between two frames' volumes that is a movement."""
 
 HIDDEN_ALIKE = 0.2
 """Share of what the unseen leaves that differs from one frame to the next; the rest hides the same in both."""
@@ -219,3 +222,13 @@ class Content:
             "config": self.config,
             "timing_ms": self.timing_ms,
         }
+
+
+def with_movement(now: Content, previous: Content | None) -> Content:
+    """With the remark that the content moved since the frame before, where it did."""
+    change = None if previous is None else now.change_since(previous)
+    if change is None or abs(change[0]) <= MOVING * change[1]:
+        return now
+    return replace(
+        now, quality=(*now.quality, Remark("filling-in-progress", f"{change[0]:+.3f} m³ since the frame before"))
+    )
