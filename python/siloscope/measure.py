@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from os import PathLike
 from pathlib import Path
 
@@ -15,7 +16,9 @@ from siloscope.content.density import Density, choose
 from siloscope.content.extras import with_vessel, without_obstacles
 from siloscope.content.fitting import cut_behind_bare_wall, fitted
 from siloscope.content.knowledge import camera_of, filled_to, know
-from siloscope.content.reading import Request, content_of, refused, unlocated
+from siloscope.content.outlined import outlined, pose_of
+from siloscope.content.reading import Request, content_of, refused, source_of, unlocated
+from siloscope.content.units import at_moisture
 from siloscope.errors import UsageError
 from siloscope.estimation.inputs import prepare
 from siloscope.locate import locate
@@ -24,6 +27,7 @@ from siloscope.types.calibration import Calibration
 from siloscope.types.camera import Camera
 from siloscope.types.content import Content
 from siloscope.types.frame import Frame
+from siloscope.types.pose import SiloPose
 from siloscope.vessel.datasheet import LONGEST
 from siloscope.vessel.floor import STEEPEST_REPOSE
 from siloscope.vessel.vessel import Vessel, given
@@ -51,6 +55,9 @@ def measure(
     density: float | None = None,
     density_std: float | None = None,
     product: str | Path | Density | None = None,
+    test_weight: str | None = None,
+    moisture: float | None = None,
+    pose: SiloPose | None = None,
     mask: ArrayLike | None = None,
     previous: Content | None = None,
 ) -> Content:
@@ -92,6 +99,13 @@ def measure(
         Bulk density and its standard deviation, kg/m³.
     product : str, path or Density, optional
         A product of the table (`siloscope.content.products()`) or of a TOML file.
+    test_weight : str, optional
+        Weighed test weight: "60" lb/bu, or "77.2kg/hl". It takes the place of the product's density.
+    moisture : float, optional
+        Of the feed, as a fraction of its wet mass: the answer then has the dry matter too.
+    pose : SiloPose, optional
+        The camera's pose where no calibration tells it, as for a bin that is not round: its outline is in the vessel
+        file.
     mask : array of bool, optional
         True where the silo is.
     previous : Content, optional
@@ -105,7 +119,9 @@ def measure(
         For settings that can't be.
     """
     start = time.perf_counter()
-    chosen = choose(density, density_std, product)
+    chosen = choose(density, density_std, product, test_weight)
+    if moisture is not None:
+        at_moisture(1.0, moisture, 0.0)
     about = given(
         vessel, top, diameter=diameter, cylinder=cylinder, cone=cone, bottom=bottom,
         outlet_diameter=outlet_diameter, outlet_length=outlet_length,
@@ -116,6 +132,12 @@ def measure(
     table = strapping if isinstance(strapping, Strapping | None) else Strapping.read(strapping)
     profile = None if sensor is None else sensors.load(sensor)
     steepest = STEEPEST_REPOSE if chosen is None else chosen.steepest
+    if pose is not None and about.outline is None:
+        raise UsageError("a pose alone bounds no surface; give a vessel file with an outline, or a calibration")
+    if about.outline is not None:
+        prepared = prepare(data, camera, profile or sensors.UNKNOWN, depth_unit=depth_unit, mask=mask)
+        placed = pose or pose_of(calibration)
+        return replace(outlined(prepared, placed, about, profile, chosen, source_of(data)), moisture=moisture)
     if calibration is None:
         estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask)
         if not estimate.ok:
@@ -138,4 +160,5 @@ def measure(
     done = time.perf_counter()
     request = Request(data, known, sheet, table, chosen, previous, calibration is None)
     times = {"prepare": 1e3 * (ready - start), "measure": 1e3 * (done - ready)}
-    return with_vessel(content_of(request, found, surface, {**prepared.config, **known.config}, times), about)
+    content = content_of(request, found, surface, {**prepared.config, **known.config}, times)
+    return replace(with_vessel(content, about), moisture=moisture)

@@ -17,6 +17,8 @@ from siloscope.cli.outcome import REFUSED, print_json, writing
 from siloscope.cli.progress import say
 from siloscope.cli.summary import headline
 from siloscope.content import Content
+from siloscope.content.units import SI, Units
+from siloscope.content.units import unit as units_of
 from siloscope.types.frame import Frame
 from siloscope.wording import counted, with_std
 
@@ -40,18 +42,30 @@ DensityStd = Annotated[float | None, typer.Option(metavar="KG_M3", help="Its sta
 Product = Annotated[
     str | None, typer.Option("--product", metavar="NAME|TOML", help="Product whose density to take, such as wheat.")
 ]
+TestWeight = Annotated[
+    str | None, typer.Option("--test-weight", metavar="WEIGHT", help="Weighed: lb/bu such as 60, or 77.2kg/hl.")
+]
+Moisture = Annotated[
+    float | None,
+    typer.Option("--moisture", metavar="PERCENT", min=0.0, max=59.9, help="Adds the dry matter."),
+]
+Unit = Annotated[
+    str | None,
+    typer.Option("--unit", metavar="UNITS", help="For text: m3, l, ft3, bu; kg, t, short-ton, long-ton, cwt, lb."),
+]
 
 
 SETTINGS = (
     *("sensor", "vessel", "diameter", "cylinder", "cone", "bottom", "top", "outlet_diameter", "outlet_length"),
-    *("strapping", "density", "density_std", "product"),
+    *("strapping", "density", "density_std", "product", "test_weight", "moisture"),
 )
 """Options that the library takes under the same names."""
 
 
 def chosen(given: dict[str, Any]) -> dict[str, Any]:
     """What a command was given for `siloscope.measure`."""
-    return {name: given[name] for name in SETTINGS}
+    settings = {name: given[name] for name in SETTINGS}
+    return settings | {"moisture": None if given["moisture"] is None else given["moisture"] / 100.0}
 
 
 def measure(
@@ -72,6 +86,12 @@ def measure(
     density: DensityNumber = None,
     density_std: DensityStd = None,
     product: Product = None,
+    test_weight: TestWeight = None,
+    moisture: Moisture = None,
+    unit: Unit = None,
+    pose: Annotated[
+        str | None, typer.Option(metavar="R_X,R_Y,T_X,T_Y", help="Pose (rad, m) in a bin whose outline --vessel has.")
+    ] = None,
     previous: Annotated[
         Path | None, typer.Option(metavar="FRAME", help="The frame before, to see whether the content moves.")
     ] = None,
@@ -88,14 +108,16 @@ def measure(
     Without --calibration the frame itself must show enough wall. Exit code 4: the frame was read well, but gives no
     trustworthy answer; the JSON says why.
     """
-    settings = chosen(locals())
+    settings, units = chosen(locals()), units_of(unit)
     place = {"camera": camera, "depth_unit": depth_unit, "stream": stream}
     frame = _frame(file, number, place)
     silo = None if calibration is None else siloscope.Calibration.load(calibration)
     before = None if previous is None else siloscope.measure(_frame(previous, 0, place), silo, **settings)
+    if pose is not None:
+        settings["pose"] = siloscope.SiloPose(*options.numbers(pose, 4, "--pose"))
     inside = None if mask is None else _mask(mask, frame)
     content = siloscope.measure(frame, silo, mask=inside, previous=before, **settings)
-    return _answer(content, out, as_json)
+    return _answer(content, out, as_json, units)
 
 
 def _frame(file: Path, number: int, place: dict[str, Any]) -> Frame:
@@ -110,7 +132,7 @@ def _mask(mask: Path, frame: Frame) -> Any:
     return region.read_mask(mask, shape)
 
 
-def _answer(content: Content, out: Path | None, as_json: bool) -> int:
+def _answer(content: Content, out: Path | None, as_json: bool, units: Units) -> int:
     if out is not None:
         from siloscope.reporting.content_files import write_content
 
@@ -120,11 +142,11 @@ def _answer(content: Content, out: Path | None, as_json: bool) -> int:
     if as_json:
         print_json(content.to_dict())
     else:
-        print_content(content)
+        print_content(content, units)
     return 0 if content.ok else REFUSED
 
 
-def print_content(content: Content) -> None:
+def print_content(content: Content, units: Units = SI) -> None:
     """A short table on stdout, remarks on stderr."""
     console = Console(highlight=False, soft_wrap=True)
     if not content.ok:
@@ -136,7 +158,7 @@ def print_content(content: Content) -> None:
     table.add_column(style="bold")
     table.add_column(justify="right")
     table.add_column(style="dim")
-    for row in _rows(content):
+    for row in _rows(content, units):
         table.add_row(*map(escape, row))
     console.print(table)
     if content.message:
@@ -161,18 +183,23 @@ def _edge(content: Content) -> str:
     return "free below the upper edge" if given else "free below the camera's height"
 
 
-def _rows(content: Content) -> list[tuple[str, str, str]]:
+def _rows(content: Content, units: Units) -> list[tuple[str, str, str]]:
     """What a person wants to read, line by line."""
     level = content.level
     datum = DATUM_WORDS.get(content.height_datum or "", "")
-    rows = [("volume", _volume(content), "")]
+    (m3, volume_sign), (kilograms, mass_sign) = units
+    rows = [("volume", _volume(content, units), "")]
     if content.ullage is not None:
-        rows.append(("ullage", with_std(content.ullage, content.ullage_std, 1.0, " m³"), _edge(content)))
-    if content.fill_fraction is not None and content.free is not None:
-        rows.append(("fill", f"{100 * content.fill_fraction:.1f} %", f"of {content.capacity:.2f} m³"))
+        rows.append(
+            ("ullage", with_std(content.ullage, content.ullage_std, 1.0 / m3, f" {volume_sign}"), _edge(content))
+        )
+    if content.fill_fraction is not None and content.capacity is not None:
+        rows.append(("fill", f"{100 * content.fill_fraction:.1f} %", f"of {content.capacity / m3:.2f} {volume_sign}"))
     if content.mass is not None:
         name = (content.density or {}).get("name", "")
-        rows.append(("mass", with_std(content.mass, content.mass_std, 1.0, " kg"), name))
+        rows.append(("mass", with_std(content.mass, content.mass_std, 1.0 / kilograms, f" {mass_sign}"), name))
+    if content.dry_mass is not None:
+        rows.append(("dry matter", f"{content.dry_mass / kilograms:.4g} {mass_sign}", ""))
     spread = "" if level.min is None or level.max is None else f"{level.min:.2f} to {level.max:.2f} m, "
     rows.append(("level", with_std(level.mean, level.std, 1.0, " m"), f"{spread}{datum}"))
     if content.shape is not None:
@@ -183,7 +210,8 @@ def _rows(content: Content) -> list[tuple[str, str, str]]:
     return rows
 
 
-def _volume(content: Content) -> str:
+def _volume(content: Content, units: Units) -> str:
     if content.volume is None:
         return f"unknown; missing: {', '.join(content.missing)}"
-    return with_std(content.volume, content.volume_std, 1.0, " m³")
+    m3, sign = units[0]
+    return with_std(content.volume, content.volume_std, 1.0 / m3, f" {sign}")

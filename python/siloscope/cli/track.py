@@ -50,6 +50,8 @@ def track(
     density: one.DensityNumber = None,
     density_std: one.DensityStd = None,
     product: one.Product = None,
+    test_weight: one.TestWeight = None,
+    moisture: one.Moisture = None,
     interval: Annotated[
         float | None, typer.Option(metavar="S", help="Seconds between frames that have no time of their own.")
     ] = None,

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope.content.units import test_weight
 from siloscope.errors import InputError, UsageError
 from siloscope.parameters import GRAVITY
 from siloscope.vessel.floor import STEEPEST_REPOSE
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
 DENSITIES = (10.0, 10_000.0)
 """Bulk densities that a silo may hold, kg/m³."""
+LOT_SPREAD = 0.01
+"""Relative spread of the test weight within a lot, against the 5 % between lots of a product table."""
 STEPS = 400
 """Slices of a column in which the pressure is followed."""
 
@@ -101,9 +104,14 @@ class Density:
 
 
 def choose(
-    density: float | None = None, density_std: float | None = None, product: str | Path | Density | None = None
+    density: float | None = None,
+    density_std: float | None = None,
+    product: str | Path | Density | None = None,
+    weighed: str | None = None,
 ) -> Density | None:
-    """The density that a caller names: a number, a product of the table, or a product file; None for none.
+    """The density that a caller names: a number, a product, a product file, or a test weight; None for none.
+
+    A weighed test weight takes the place of a product's density, and keeps its compaction and repose.
 
     Raises
     ------
@@ -112,8 +120,10 @@ def choose(
     InputError
         For a file that is no product.
     """
-    if density is not None and product is not None:
-        raise UsageError("give a density or a product, not both")
+    if density is not None and (product is not None or weighed is not None):
+        raise UsageError("give a density or a product or a test weight, not two of them")
+    if weighed is not None:
+        return _weighed(weighed, density_std, product)
     if density is None and product is None:
         if density_std is not None:
             raise UsageError("a density's deviation without a density; give --density too")
@@ -122,6 +132,24 @@ def choose(
         return _number(density, density_std)
     chosen = product if isinstance(product, Density) else load(str(product))
     return chosen if density_std is None else _with_std(chosen, density_std)
+
+
+def _weighed(weighed: str, std: float | None, product: str | Path | Density | None) -> Density:
+    loose = test_weight(weighed)
+    base = (
+        Density("weighed", loose)
+        if product is None
+        else product
+        if isinstance(product, Density)
+        else load(str(product))
+    )
+    return replace(
+        base,
+        loose=loose,
+        std=LOT_SPREAD * loose if std is None else std,
+        source=f"test weight of {weighed}; deviation {100.0 * LOT_SPREAD:g} % within a lot",
+        compaction=tuple((pressure, dense * loose / base.loose) for pressure, dense in base.compaction),
+    )
 
 
 def products() -> dict[str, Density]:

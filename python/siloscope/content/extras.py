@@ -53,14 +53,20 @@ def without_obstacles(prepared: Prepared, known: Knowledge, vessel: Vessel) -> P
     if isinstance(prepared, PreparedPoints):
         hidden = vessel.in_obstacle(known.pose.to_silo(prepared.points), edge, MARGIN)
         return replace(prepared, points=prepared.points[~hidden])
-    depth, camera = prepared.depth, prepared.camera
-    seen = np.nonzero(depth > 0.0)
-    deep = _unbiased(depth[seen].astype(np.float64), known.bias)
-    points = known.pose.to_silo(np.column_stack([camera.rays()[seen] * deep[:, None], deep]))
-    hidden = vessel.in_obstacle(points, edge, MARGIN)
-    cut = depth.copy()
+    seen = np.nonzero(prepared.depth > 0.0)
+    hidden = vessel.in_obstacle(known.pose.to_silo(seen_points(prepared, known.bias)), edge, MARGIN)
+    cut = prepared.depth.copy()
     cut[seen[0][hidden], seen[1][hidden]] = 0.0
     return replace(prepared, depth=cut)
+
+
+def seen_points(prepared: Prepared, bias: tuple[float, float, float]) -> NDArray[np.float64]:
+    """The measured points (N, 3) of a frame in the camera frame, an image's without the sensor's bias."""
+    if isinstance(prepared, PreparedPoints):
+        return prepared.points
+    seen = np.nonzero(prepared.depth > 0.0)
+    deep = _unbiased(prepared.depth[seen].astype(np.float64), bias)
+    return np.column_stack([prepared.camera.rays()[seen] * deep[:, None], deep])
 
 
 def _unbiased(measured: NDArray[np.float64], bias: tuple[float, float, float]) -> NDArray[np.float64]:

@@ -29,11 +29,13 @@ MASSES = {
 }
 """Name: kg in one, and the sign."""
 
-POUNDS_OR_KILOGRAMS = 75.0
-"""Test weights below are lb/bu (oats 32, wheat 60), above are kg/hl only with the unit said."""
+Units = tuple[tuple[float, str], tuple[float, str]]
+"""Scale and sign of volumes and of masses in text."""
+
+SI: Units = (VOLUMES["m3"], MASSES["kg"])
 
 
-def unit(name: str | None) -> tuple[tuple[float, str], tuple[float, str]]:
+def unit(name: str | None) -> Units:
     """Scale and sign of volumes and of masses in text; m³ and kg for what the name does not say.
 
     Raises

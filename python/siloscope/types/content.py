@@ -130,6 +130,8 @@ class Content:
     """Share of the surface that is really seen."""
     mass: float | None = None
     mass_std: float | None = None
+    moisture: float | None = None
+    """Fraction of the wet mass."""
     density: dict[str, Any] | None = None
     """Density with its source, and its mean under the content's own weight."""
     shape: Shape | None = None
@@ -184,6 +186,11 @@ class Content:
             return earlier.ullage - self.ullage, std
         return None
 
+    @property
+    def dry_mass(self) -> float | None:
+        """Dry matter, kg."""
+        return None if self.mass is None or self.moisture is None else self.mass * (1.0 - self.moisture)
+
     def has(self, code: str) -> bool:
         """Whether a remark of this code is there."""
         return any(remark.code == code for remark in self.quality)
@@ -210,6 +217,8 @@ class Content:
             "coverage": self.coverage,
             "mass_kg": self.mass,
             "mass_std_kg": self.mass_std,
+            "moisture": self.moisture,
+            "dry_mass_kg": self.dry_mass,
             "density": self.density,
             "shape": None if self.shape is None else self.shape.to_dict(),
             "quality": [remark.to_dict() for remark in self.quality],
