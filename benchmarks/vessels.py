@@ -20,6 +20,7 @@ import tempfile
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -83,11 +84,10 @@ def answers(bottom: str, seed: int, width: int, known: list[str]) -> Iterator[An
     with tempfile.TemporaryDirectory() as folder:
         file = vessel_file(empty, Path(folder) / "vessel.toml")
         for seen in (empty.again(2), *feeds(empty, seed)):
-            frame, top = seen.frame, seen.top
             readings = {
-                "nothing": lambda f=frame, t=top: siloscope.measure(f, sensor="orbbec-astra-s", top=t),
-                "told": lambda f=frame: siloscope.measure(f, silo, vessel=file),
-                "tare": lambda f=frame, t=top: siloscope.measure(f, tared, top=t),
+                "nothing": partial(siloscope.measure, seen.frame, sensor="orbbec-astra-s", top=seen.top),
+                "told": partial(siloscope.measure, seen.frame, silo, vessel=file),
+                "tare": partial(siloscope.measure, seen.frame, tared, top=seen.top),
             }
             for name in known:
                 yield judged(name, bottom, seen, readings[name]())
@@ -121,7 +121,9 @@ def feed(shape: str, z: float, radius: float, draw: np.random.Generator) -> Feed
 
 
 def _waves(draw: np.random.Generator) -> tuple[tuple[float, float, float, float], ...]:
-    return tuple((0.006, *(float(v) for v in draw.uniform(2.0, 8.0, 2)), float(draw.uniform(0, 6.28))) for _ in "12")
+    (ax, ay), (bx, by) = draw.uniform(2.0, 8.0, (2, 2)).tolist()
+    first, second = draw.uniform(0.0, 6.28, 2).tolist()
+    return (0.006, ax, ay, first), (0.006, bx, by, second)
 
 
 def judged(known: str, bottom: str, seen: vessels.Seen, content: siloscope.Content) -> Answer:

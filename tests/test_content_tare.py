@@ -34,7 +34,7 @@ def test_against_a_tare_any_floor_gives_a_true_volume(kind: str, tmp_path: Path)
 
 def test_an_empty_frame_that_shows_no_floor_is_no_tare() -> None:
     empty = vessels.Seen.draw("oblique", 1)
-    dark = siloscope.Frame(depth=0.0 * empty.frame.depth, camera=empty.camera)  # type: ignore[operator]
+    dark = siloscope.Frame(depth=0.0 * empty.frame.depth, camera=empty.camera)
     with pytest.raises(InputError, match="quarter"):
         siloscope.tare(empty.calibration(), [dark])
 

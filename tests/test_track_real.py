@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import siloscope
 from silos import known, noisy, scene
@@ -55,7 +56,9 @@ def test_a_name_s_time_wins_over_the_interval() -> None:
     assert clock.time(3, 12.5, "recording.bag") == 12.5
 
 
-def readings(volumes: Sequence[float], own: float = 0.01, coverage: float = 0.8, ullage: bool = False) -> list[Reading]:
+def readings(
+    volumes: Sequence[float] | NDArray[np.float64], own: float = 0.01, coverage: float = 0.8, ullage: bool = False
+) -> list[Reading]:
     """Hourly readings."""
     return [
         Reading(

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import siloscope
 from silos import STOUT, known, measured, scene
 from siloscope.cli import main
 from siloscope.conservation import Amount, change, check_volume, moved_amount
@@ -20,8 +19,9 @@ from siloscope.content.knowledge import know
 from siloscope.content.strapping_table import strapping_table, write_csv
 from siloscope.errors import InputError, UsageError
 from siloscope.reconcile import Ticket, read_tickets, reconcile
+from siloscope.schema import documents
 from siloscope.simulation import Feed
-from siloscope.types.track import Event
+from siloscope.types.track import Event, utc
 from siloscope.vessel.vessel import given
 
 Shown = pytest.CaptureFixture[str]
@@ -112,7 +112,7 @@ class TestTickets:
         events, tickets = _events(6, 700.0)
         track = {"schema": "siloscope.track/1", "events": [event.to_dict() for event in events]}
         (tmp_path / "track.json").write_text(json.dumps(track))
-        rows = [f"{siloscope.types.track.utc(t.time)};{t.mass / 1000:.4f};{t.name}".replace(".", ",") for t in tickets]
+        rows = [f"{utc(t.time)};{t.mass / 1000:.4f};{t.name}".replace(".", ",") for t in tickets]
         (tmp_path / "tickets.csv").write_text("time;mass;ticket\n" + "\n".join(rows) + "\n")
         command = ["reconcile", str(tmp_path / "track.json"), "--tickets", str(tmp_path / "tickets.csv"), "--unit", "t"]
         assert main([*command, "--json"]) == 0
@@ -173,7 +173,7 @@ class TestConservation:
 
     def test_the_command(self, tmp_path: Path, capsys: Shown) -> None:
         for name, content in zip(("a", "b"), self.readings(), strict=True):
-            (tmp_path / f"{name}.json").write_text(json.dumps(siloscope.schema.documents.plain(content.to_dict())))
+            (tmp_path / f"{name}.json").write_text(json.dumps(documents.plain(content.to_dict())))
         files = [str(tmp_path / f"{name}.json") for name in ("a", "b")]
         amount = change(*self.readings()).volume
         assert main(["check-volume", *files, "--moved", f"{amount}m3", "--json"]) == 0
