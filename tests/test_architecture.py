@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import ast
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
+
+import siloscope
 
 PACKAGE = Path(__file__).parents[1] / "python" / "siloscope"
 MODULES = sorted(path.relative_to(PACKAGE) for path in PACKAGE.rglob("*.py"))
@@ -43,3 +47,31 @@ def test_what_the_package_is_made_of_does_not_import_its_face(module: Path) -> N
             assert "siloscope" not in [alias.name for alias in node.names]
         if isinstance(node, ast.ImportFrom) and node.module == "siloscope":
             assert {alias.name for alias in node.names} <= {"_core", "sensors"}
+
+
+def test_the_package_and_its_help_load_no_numpy() -> None:
+    program = (
+        "import sys, siloscope; from siloscope.cli import main; main(['--help']); sys.exit('numpy' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", program], capture_output=True, check=False).returncode == 0
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_a_verb_is_its_function_whatever_is_imported_first(verb: str) -> None:
+    for first in (
+        f"import siloscope.{verb}",
+        f"from siloscope.{verb} import {verb}",
+        f"from siloscope import {verb}",
+        "",
+    ):
+        program = f"{first}\nimport siloscope, sys\nsys.exit(siloscope.{verb}.__name__ != '{verb}')"
+        assert subprocess.run([sys.executable, "-c", program], check=False).returncode == 0
+
+
+def test_every_public_name_is_there_and_no_other() -> None:
+    for name in siloscope.__all__:
+        assert getattr(siloscope, name).__doc__ or name == "__version__"
+    assert set(siloscope.__all__) <= set(dir(siloscope))
+    assert siloscope.sensors.names()
+    with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
+        getattr(siloscope, "noth" + "ing")

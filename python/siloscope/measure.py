@@ -13,11 +13,10 @@ from siloscope import sensors
 from siloscope.calibrate import calibrate
 from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density, choose
-from siloscope.content.extras import with_vessel, without_obstacles
-from siloscope.content.fitting import cut_behind_bare_wall, fitted
-from siloscope.content.knowledge import camera_of, filled_to, know
+from siloscope.content.knowledge import camera_of, know
+from siloscope.content.measuring import content_in_silo
 from siloscope.content.outlined import outlined, pose_of
-from siloscope.content.reading import Request, content_of, refused, source_of, unlocated
+from siloscope.content.reading import Request, source_of, unlocated
 from siloscope.content.units import at_moisture
 from siloscope.errors import UsageError
 from siloscope.estimation.inputs import prepare
@@ -28,7 +27,6 @@ from siloscope.types.camera import Camera
 from siloscope.types.content import Content
 from siloscope.types.frame import Frame
 from siloscope.types.pose import SiloPose
-from siloscope.vessel.datasheet import LONGEST
 from siloscope.vessel.floor import STEEPEST_REPOSE
 from siloscope.vessel.vessel import Vessel, given
 
@@ -127,8 +125,6 @@ def measure(
         outlet_diameter=outlet_diameter, outlet_length=outlet_length,
     )  # fmt: skip
     sheet, top = about.sheet, about.top
-    if top is not None and not abs(top) <= LONGEST:
-        raise UsageError(f"top must be between -{LONGEST:g} and {LONGEST:g} m, got {top}")
     table = strapping if isinstance(strapping, Strapping | None) else Strapping.read(strapping)
     profile = None if sensor is None else sensors.load(sensor)
     steepest = STEEPEST_REPOSE if chosen is None else chosen.steepest
@@ -149,16 +145,6 @@ def measure(
         known = know(silo, profile, sheet, top, sheet.diameter, steepest)
     prepared = prepare(data, camera_of(data, camera, silo), profile or sensors.UNKNOWN,
                        depth_unit=depth_unit, mask=mask)  # fmt: skip
-    ready = time.perf_counter()
-    known = filled_to(known, about)
-    if known.lengths.geometry.radius is None:
-        return refused("radius-unknown", "no cylinder is seen", data, known)
-    prepared = without_obstacles(prepared, known, about)
-    if known.lengths.cone_only:
-        known = cut_behind_bare_wall(prepared, known, sheet, silo)
-    found, surface = fitted(prepared, known, sheet)
-    done = time.perf_counter()
     request = Request(data, known, sheet, table, chosen, previous, calibration is None)
-    times = {"prepare": 1e3 * (ready - start), "measure": 1e3 * (done - ready)}
-    content = content_of(request, found, surface, {**prepared.config, **known.config}, times)
-    return replace(with_vessel(content, about), moisture=moisture)
+    content = content_in_silo(prepared, silo, about, request, 1e3 * (time.perf_counter() - start))
+    return replace(content, moisture=moisture)

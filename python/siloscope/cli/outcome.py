@@ -15,7 +15,6 @@ from typing import Any
 import typer
 
 from siloscope.errors import SiloscopeError, UsageError
-from siloscope.schema import documents
 
 REFUSED = 4
 """Read well, but the frame does not show enough wall."""
@@ -67,6 +66,8 @@ def _forget_where_it_was() -> None:
 
 def print_json(document: Any) -> None:
     """Print the one JSON document of a command; NaN and infinities become null."""
+    from siloscope.schema import documents
+
     print(documents.text(document, 2))
 
 

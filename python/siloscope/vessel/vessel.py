@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from siloscope.errors import UsageError
 from siloscope.vessel import bottoms
-from siloscope.vessel.datasheet import Datasheet
+from siloscope.vessel.datasheet import LONGEST, Datasheet
 
 if TYPE_CHECKING:
     from siloscope.schema import vessel as schema
@@ -147,9 +147,12 @@ def given(vessel: Vessel | str | Path | None, top: float | None, **lengths: Any)
         own["cone"] = None
     if told.get("cone") and "bottom" not in told:
         own["bottom"] = None
+    edge = base.top if top is None else top
+    if edge is not None and not abs(edge) <= LONGEST:
+        raise UsageError(f"top must be between -{LONGEST:g} and {LONGEST:g} m, got {edge}")
     return Vessel(
         Datasheet(**{**own, **told}),
-        base.top if top is None else top,
+        edge,
         base.fill_height,
         base.courses,
         base.roof,
