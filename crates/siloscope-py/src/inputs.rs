@@ -92,6 +92,12 @@ impl<'py> DepthFrame<'py> {
         if depth.shape() != expected {
             return Err(value_error(format!("the depth has shape {:?}, its camera {expected:?}", depth.shape())));
         }
+        if let Some(rays) = self.rays.as_ref().filter(|rays| rays.shape() != [expected[0], expected[1], 2]) {
+            return Err(value_error(format!("the rays have shape {:?}, the camera {expected:?}", rays.shape())));
+        }
+        if let Some(mask) = self.mask.as_ref().filter(|mask| mask.shape() != expected) {
+            return Err(value_error(format!("the mask has shape {:?}, the camera {expected:?}", mask.shape())));
+        }
         let rays = self.rays.as_ref().map(in_c_order).transpose()?;
         let mask = self.mask.as_ref().map(in_c_order).transpose()?;
         Ok(FrameBuffers { depth: in_c_order(depth)?, camera: &self.camera, rays, unit: self.unit, mask })

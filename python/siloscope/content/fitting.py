@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
-from siloscope.content.knowledge import WALL_STD, Knowledge, narrowed
+from siloscope.content.knowledge import Knowledge, narrowed
+from siloscope.content.setup import ContentSetup, CoreVessel
 from siloscope.errors import InputError, UsageError
 from siloscope.estimation.decimation import STEP, decimated_camera
 from siloscope.estimation.inputs import Prepared, PreparedPoints
@@ -21,28 +21,17 @@ BEHIND = 1.5
 """Cells behind the farthest one that shows the bare cone at which a cone without an end is cut off."""
 
 
-def _inputs(
-    prepared: Prepared, known: Knowledge, sheet: Datasheet
-) -> tuple[DepthFrame | NDArray[np.float32], _core.ContentSetup]:
-    """What the core takes."""
-    data = (
-        np.asarray(prepared.points, np.float32)
-        if isinstance(prepared, PreparedPoints)
-        else DepthFrame.of(prepared.depth, prepared.camera)
-    )
-    setup = _core.ContentSetup(
-        (known.pose.r_x, known.pose.r_y, known.pose.t_x, known.pose.t_y), lengths_for_core(known, sheet),
-        known.covariance, WALL_STD, known.bias, known.noise, known.noise_known, known.range,
-    )  # fmt: skip
-    return data, setup
+def _data(prepared: Prepared) -> DepthFrame | NDArray[np.float32]:
+    """A frame as the core takes it."""
+    if isinstance(prepared, PreparedPoints):
+        return np.asarray(prepared.points, np.float32)
+    return DepthFrame.of(prepared.depth, prepared.camera)
 
 
-def fitted(
-    prepared: Prepared, known: Knowledge, sheet: Datasheet
-) -> tuple[dict[str, Any], _core.ContentSurface | None]:
+def fitted(prepared: Prepared, known: Knowledge, sheet: Datasheet) -> _core.ContentMeasure:
     """The core's answer."""
     try:
-        return _core.content_measure(*_inputs(prepared, known, sheet))
+        return _core.content_measure(_data(prepared), ContentSetup(known, lengths_for_core(known, sheet)))
     except ValueError as error:
         raise UsageError(str(error)) from None
 
@@ -51,13 +40,13 @@ def cut_behind_bare_wall(prepared: Prepared, known: Knowledge, sheet: Datasheet,
     """A cone of which nobody knows where it ends, cut off behind the farthest bare wall, so that the map fits it."""
     radius = known.lengths.geometry.radius
     try:
-        bare = _core.content_bare_reach(*_inputs(_every_other(prepared), known, sheet))
+        setup = ContentSetup(known, lengths_for_core(known, sheet))
+        bare = _core.content_bare_reach(_data(_every_other(prepared)), setup)
     except ValueError as error:
         raise UsageError(str(error)) from None
     if bare is None or radius is None:
         return known
-    farthest, cell = bare
-    return narrowed(known, calibration, min(farthest + BEHIND * cell, radius))
+    return narrowed(known, calibration, min(bare.farthest + BEHIND * bare.cell, radius))
 
 
 def _every_other(prepared: Prepared) -> Prepared:
@@ -71,7 +60,7 @@ BOTTOMLESS = 100.0
 """How far below the camera the floor is put while nobody knows it, m: everything seen then is content."""
 
 
-def lengths_for_core(known: Knowledge, sheet: Datasheet) -> tuple[float, ...]:
+def lengths_for_core(known: Knowledge, sheet: Datasheet) -> CoreVessel:
     """Lengths as the core takes them; a floor that nobody knows is put out of sight."""
     geometry = known.lengths.geometry
     if geometry.radius is None:
@@ -93,4 +82,4 @@ def lengths_for_core(known: Knowledge, sheet: Datasheet) -> tuple[float, ...]:
             "--top is negative above the camera"
         )
     outlet = sheet.outlet_diameter / 2.0
-    return geometry.radius, bottom, apex, known.lengths.top, outlet, sheet.outlet_length, *known.ovality
+    return CoreVessel(geometry.radius, bottom, apex, known.lengths.top, outlet, sheet.outlet_length, *known.ovality)

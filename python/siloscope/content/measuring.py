@@ -26,7 +26,7 @@ def content_in_silo(
     prepared = without_obstacles(prepared, known, about)
     if known.lengths.cone_only:
         known = cut_behind_bare_wall(prepared, known, request.sheet, silo)
-    found, surface = fitted(prepared, known, request.sheet)
+    measured = fitted(prepared, known, request.sheet)
     times = {"prepare": prepare_ms, "measure": 1e3 * (time.perf_counter() - start)}
     config = {**prepared.config, **known.config}
-    return with_vessel(content_of(replace(request, known=known), found, surface, config, times), about)
+    return with_vessel(content_of(replace(request, known=known), measured, config, times), about)

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
-from siloscope.content.knowledge import Knowledge
+from siloscope.content.setup import ContentSetup, CoreVessel
 from siloscope.content.ullage import GROUPS, capacity_derivatives, std_by
 from siloscope.types.content import Parts
 from siloscope.types.floor import FloorMap
@@ -43,18 +42,17 @@ class OverFloor:
 
 
 def volume_over(
-    core: _core.ContentSurface,
-    found: dict[str, Any],
-    known: Knowledge,
     floor: FloorMap,
-    silo: tuple[float, ...],
-    wall_std: float,
+    core: _core.ContentSurface,
+    found: _core.ContentMeasure,
+    setup: ContentSetup,
 ) -> OverFloor:
     """The content between a surface and a floor that is known as a map."""
+    silo, known = setup.silo, setup.known
     x, y, area = _places(silo[0], silo[6:8])
     bottom, surface = floor.at(floor.z, x, y), core.z_at(np.column_stack([x, y]))
     thickness = bottom - surface
-    std = np.hypot(floor.at(floor.std, x, y), wall_std)
+    std = np.hypot(floor.at(floor.std, x, y), setup.wall_std)
     seen = _seen(core, x, y)
     counted = np.where(seen, thickness, np.maximum(thickness, 0.0))
     covered = np.abs(thickness) > BELOW * std
@@ -62,7 +60,7 @@ def volume_over(
     by = _derivatives(floor, found, silo, float(counted.reshape(RINGS, SPOKES)[-1].mean()))
     parts = {name: std_by(by, known.covariance, group) for name, group in GROUPS.items()}
     parts["geometry"] = math.hypot(parts["geometry"], floor_std)
-    own = {name: float(found["std"][name]) for name in ("noise", "unseen", "grid")}
+    own = {"noise": found.std.noise, "unseen": found.std.unseen, "grid": found.std.grid}
     total = math.hypot(std_by(by, known.covariance, slice(None)), floor_std, *own.values())
     sunken = float((covered & (thickness < 0.0) & seen).sum() / max(seen.sum(), 1))
     capacity = float((bottom - silo[3]).sum() * area)
@@ -80,18 +78,17 @@ def _places(radius: float, ovality: tuple[float, ...]) -> tuple[NDArray[np.float
 
 def _seen(core: _core.ContentSurface, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
     kinds = core.kinds()
-    (cx, cy), reach, side = core.grid
+    grid = core.grid
+    (cx, cy), reach, side = grid.centre, grid.reach, grid.side
     column, row = (
         np.clip(((v - c + reach) * side / (2.0 * reach)).astype(int), 0, side - 1) for v, c in ((x, cx), (y, cy))
     )
     return np.isin(kinds[row, column], (KINDS["content"], KINDS["rim"], KINDS["floor"]))
 
 
-def _derivatives(
-    floor: FloorMap, found: dict[str, Any], silo: tuple[float, ...], at_wall: float
-) -> NDArray[np.float64]:
+def _derivatives(floor: FloorMap, found: _core.ContentMeasure, silo: CoreVessel, at_wall: float) -> NDArray[np.float64]:
     """Derivatives (10,) of the volume: of the empty vessel's ullage less this frame's."""
-    by = np.asarray(found["derivatives"], float) - capacity_derivatives(silo)
+    by = found.derivatives - capacity_derivatives(silo)
     by[4] = 2.0 * math.pi * silo[0] * at_wall  # a ring more of content at a wider wall
     if floor.derivatives is None:
         by[5] += math.pi * silo[0] ** 2  # the floor hangs at the cylinder's lower edge

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,10 +15,12 @@ from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density
 from siloscope.content.fitting import lengths_for_core
 from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge
+from siloscope.content.measured import Measured
 from siloscope.content.over_floor import OverFloor, volume_over
+from siloscope.content.setup import ContentSetup, CoreVessel
 from siloscope.content.ullage import Ullage, ullage_of
 from siloscope.reasons import CONTENT_REMARKS, sentence
-from siloscope.types.content import Content, Level, Parts, Remark, with_movement
+from siloscope.types.content import Content, Level, Remark, with_movement
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
 from siloscope.types.surface_map import Shape, SurfaceMap
@@ -50,20 +52,19 @@ class Request:
 
 def content_of(
     request: Request,
-    found: dict[str, Any],
-    core: _core.ContentSurface | None,
+    core: _core.ContentMeasure,
     config: dict[str, Any],
     times: dict[str, float],
 ) -> Content:
     """The core's numbers as the answer to a request: refused, or with everything that can be told."""
     known = request.known
     silo = lengths_for_core(known, request.sheet)
-    lacking = _lacking(known, found)
-    free = ullage_of(found, known, silo)
-    over = _over(core, found, request, silo, free)
+    lacking = _lacking(known, core)
+    free = ullage_of(core, known, silo)
+    over = _over(core, ContentSetup(known, silo), free)
     capacity, capacity_from = _capacity(request, silo, lacking, over)
-    found = _with_total(found, over, free if lacking else None)
-    coverage = _coverage(found)
+    found = _with_total(Measured.of(core), over, free if lacking else None)
+    coverage = _coverage(core)
     said = (*known.remarks, *quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
     frame: dict[str, Any] = {
         "source": source_of(request.data),
@@ -82,37 +83,32 @@ def content_of(
     if against is not None:
         return _refused(against, frame)
     if any(remark.code == "camera-moved" for remark in said):
-        found = {**found, "std": _with_move(found)}
-    answer = _empty(request, found, silo) if _is_empty(found) else _filled(request, found, core, silo, lacking, over)
-    parts = None if lacking else Parts(*(found["std"][name] for name in Parts.__dataclass_fields__))
+        found = _with_move(found)
+    volume = core.volume
+    answer = _empty(request, core, silo) if volume is None else _filled(request, found, volume, silo, lacking, over)
+    parts = None if lacking else found.parts
     if lacking:
         frame |= {"message": settles(known.floor, lacking), "quality": (*said, _unknown_bottom(known, lacking))}
     if free is not None:
         frame |= {"ullage": free.volume, "ullage_std": free.std, "ullage_parts": free.parts}
         frame["ullage_derivatives"] = free.derivatives
-    now = Content("ok", parts=parts, coverage=coverage, shape=Shape.of(found["shape"]), **answer, **frame)
+    now = Content("ok", parts=parts, coverage=coverage, shape=Shape.of(core.shape), **answer, **frame)
     return with_movement(now, request.previous)
 
 
-def _over(
-    core: _core.ContentSurface | None,
-    found: dict[str, Any],
-    request: Request,
-    silo: tuple[float, ...],
-    free: Ullage | None,
-) -> OverFloor | None:
+def _over(core: _core.ContentMeasure, setup: ContentSetup, free: Ullage | None) -> OverFloor | None:
     """The content over a floor that is known as a map; None where it is not, or no surface was found."""
-    floor = request.known.floor.map
-    if floor is None or core is None or free is None:
+    floor, surface = setup.known.floor.map, core.surface
+    if floor is None or surface is None or free is None:
         return None
-    return volume_over(core, found, request.known, floor, silo, WALL_STD)
+    return volume_over(floor, surface, core, setup)
 
 
-def _with_total(found: dict[str, Any], over: OverFloor | None, free: Ullage | None) -> dict[str, Any]:
+def _with_total(found: Measured, over: OverFloor | None, free: Ullage | None) -> Measured:
     """The core's answer with the deviations of what is stated: content over a map, or ullage alone."""
     if over is not None:
-        return {**found, "std": {**found["std"], **over.parts.to_dict(), "total": over.std}, "sunken": over.sunken}
-    return found if free is None else {**found, "std": {**found["std"], "total": free.std}}
+        return replace(found, parts=over.parts, total=over.std, sunken=over.sunken)
+    return found if free is None else replace(found, total=free.std)
 
 
 def _beyond_range(known: Knowledge, against: Remark | None) -> Remark | None:
@@ -129,42 +125,43 @@ def _unknown_bottom(known: Knowledge, lacking: tuple[str, ...]) -> Remark:
     return Remark("bottom-unknown", f"not known: {', '.join(lacking)}{seen}")
 
 
-def _with_move(found: dict[str, Any]) -> dict[str, float]:
+def _with_move(found: Measured) -> Measured:
     """The volume's deviations when the camera seems to have moved a little: the move counts as the pose's error."""
     matter = quality.move_matters(found)
-    return {**found["std"], **{name: math.hypot(found["std"][name], matter) for name in ("pose", "total")}}
+    parts = replace(found.parts, pose=math.hypot(found.parts.pose, matter))
+    return replace(found, parts=parts, total=math.hypot(found.total, matter))
 
 
-def _is_empty(found: dict[str, Any]) -> bool:
+def _is_empty(core: _core.ContentMeasure) -> bool:
     """Nothing but bare floor is seen."""
-    few = max(FEWEST, STRAY * found["kinds"][3])
-    return found["volume"] is None and found["kinds"][1] < few and found["bare"] is not None
+    few = max(FEWEST, STRAY * core.cells.bare)
+    return core.volume is None and core.cells.content < few and core.bare is not None
 
 
-def _coverage(found: dict[str, Any]) -> float | None:
+def _coverage(core: _core.ContentMeasure) -> float | None:
     """Share of the surface that is seen; None where there is no surface."""
-    numbers = found["volume"]
-    if numbers is None:
-        return 1.0 if _is_empty(found) else None
-    return float(numbers["seen"] / max(numbers["area"], 1e-12))
+    volume = core.volume
+    if volume is None:
+        return 1.0 if _is_empty(core) else None
+    return volume.seen / max(volume.area, 1e-12)
 
 
 def _filled(
     request: Request,
-    found: dict[str, Any],
-    core: _core.ContentSurface | None,
-    silo: tuple[float, ...],
+    found: Measured,
+    under: _core.SurfaceVolume,
+    silo: CoreVessel,
     lacking: tuple[str, ...],
     over: OverFloor | None,
 ) -> dict[str, Any]:
     """Heights, volume and mass under a surface."""
-    floor = request.known.floor.map
+    core, floor = found.core.surface, request.known.floor.map
     vertex = request.known.lengths.geometry.apex is not None
-    lowest = silo[2] if vertex else float(found["volume"]["extremes"][1])
+    lowest = silo[2] if vertex else under.lowest
     datum = lowest if floor is None else floor.lowest
-    level = _level(found, core, datum)
+    level = _level(under, found.total, core, datum)
     surface = None if core is None else SurfaceMap(core, datum, silo[0])
-    volume, std = (None, None) if lacking else _volume(request, found, silo, level, over)
+    volume, std = (None, None) if lacking else _volume(request, (under.volume, found.total), silo, level, over)
     columns = _columns(surface, silo) if over is None else over.columns[over.columns > 0.0]
     return {
         "volume": volume,
@@ -176,14 +173,15 @@ def _filled(
     }
 
 
-def _empty(request: Request, found: dict[str, Any], silo: tuple[float, ...]) -> dict[str, Any]:
+def _empty(request: Request, core: _core.ContentMeasure, silo: CoreVessel) -> dict[str, Any]:
     """No content seen: none, up to the level that could hide on the vertex unseen."""
     known = request.known
     volume, std = None, None
     if not known.missing:
         radius, bottom, apex, *_ = silo
         thin = DETECTABLE * math.hypot(WALL_STD, math.sqrt(max(float(known.covariance[6, 6]), 0.0)))
-        hidden = max(thin, found["bare"][0] * (apex - bottom) / radius)
+        nearest = 0.0 if core.bare is None else core.bare.nearest
+        hidden = max(thin, nearest * (apex - bottom) / radius)
         volume, std = 0.0, _core.vessel_volume_below(silo, [apex - hidden])[0]
     return {
         "volume": volume,
@@ -201,12 +199,12 @@ def _datum(known: Knowledge) -> str:
     return "cone-vertex" if known.floor.kind == "cone" else "floor"
 
 
-def _lacking(known: Knowledge, found: dict[str, Any]) -> tuple[str, ...]:
+def _lacking(known: Knowledge, core: _core.ContentMeasure) -> tuple[str, ...]:
     """Lengths without which there is no volume; of a cone alone, the radius where the content may reach beyond it."""
     if not known.lengths.cone_only:
         return known.missing
-    numbers, bare = found["volume"], found["bare"]
-    inside = numbers is None or (bare is not None and numbers["reach"] <= bare[1])
+    volume, bare = core.volume, core.bare
+    inside = volume is None or (bare is not None and volume.reach <= bare.farthest)
     return () if inside else ("radius",)
 
 
@@ -224,7 +222,7 @@ def _refused(remark: Remark, frame: dict[str, Any]) -> Content:
 
 
 def _capacity(
-    request: Request, silo: tuple[float, ...], lacking: tuple[str, ...], over: OverFloor | None
+    request: Request, silo: CoreVessel, lacking: tuple[str, ...], over: OverFloor | None
 ) -> tuple[float | None, str | None]:
     if request.strapping is not None:
         return request.strapping.capacity, "strapping"
@@ -236,31 +234,28 @@ def _capacity(
     return _core.vessel_volume_below(silo, [silo[3]])[0], source
 
 
-def _level(found: dict[str, Any], core: _core.ContentSurface | None, datum: float) -> Level:
-    numbers = found["volume"]
-    area = numbers["area"]
-    if area <= 0.0 or core is None:
+def _level(under: _core.SurfaceVolume, std: float, core: _core.ContentSurface | None, datum: float) -> Level:
+    """Heights over the datum; `std` is the volume's deviation."""
+    if under.area <= 0.0 or core is None:
         return Level(*[0.0] * 4)
     at_axis = float(core.z_at(np.zeros((1, 2)))[0])
-    low, high = numbers["extremes"]
-    at_wall = numbers["at_wall"]
     return Level(
-        datum - numbers["moment"] / area,
-        datum - high,
-        datum - low,
+        datum - under.moment / under.area,
+        datum - under.lowest,
+        datum - under.highest,
         max(datum - at_axis, 0.0),
-        None if at_wall is None else datum - at_wall,
-        found["std"]["total"] / area,
+        None if under.at_wall is None else datum - under.at_wall,
+        std / under.area,
     )
 
 
 def _volume(
-    request: Request, found: dict[str, Any], silo: tuple[float, ...], level: Level, over: OverFloor | None
+    request: Request, found: tuple[float, float], silo: CoreVessel, level: Level, over: OverFloor | None
 ) -> tuple[float, float]:
     """Volume by the geometry; with a strapping table, the table's below the mean level and the rest by geometry."""
     if over is not None:
         return over.volume, over.std
-    volume, std = float(found["volume"]["volume"]), float(found["std"]["total"])
+    volume, std = found
     if request.strapping is None or level.mean is None:
         return volume, std
     below = _core.vessel_volume_below(silo, [silo[2] - level.mean])[0]
@@ -272,7 +267,7 @@ def _mass(
     volume: float | None,
     std: float | None,
     columns: NDArray[np.float64],
-    silo: tuple[float, ...],
+    silo: CoreVessel,
 ) -> dict[str, Any]:
     if density is None or volume is None or std is None:
         return {"density": None if density is None else density.to_dict()}
@@ -285,7 +280,7 @@ def _mass(
     }
 
 
-def _columns(surface: SurfaceMap | None, silo: tuple[float, ...]) -> NDArray[np.float64]:
+def _columns(surface: SurfaceMap | None, silo: CoreVessel) -> NDArray[np.float64]:
     """Heights of the content over the floor in the map's cells."""
     if surface is None:
         return np.zeros(0)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from siloscope import _core
 from siloscope.content.fitting import lengths_for_core
 from siloscope.content.knowledge import Knowledge
+from siloscope.content.setup import CoreVessel
 from siloscope.errors import InputError
 from siloscope.types.floor import FloorMap
 from siloscope.vessel.vessel import Vessel
@@ -93,13 +94,11 @@ def strapping_table(known: Knowledge, vessel: Vessel, step: float = 0.01) -> Tab
     return Table(rows, budget, datum, known.assumed, plain)
 
 
-def _volumes(
-    silo: tuple[float, ...], floor: FloorMap | None, vessel: Vessel, z: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _volumes(silo: CoreVessel, floor: FloorMap | None, vessel: Vessel, z: NDArray[np.float64]) -> NDArray[np.float64]:
     """Volumes under level planes at heights z, m³."""
     edge = silo[1]
     if floor is None:
-        made = np.asarray(_core.vessel_volume_below(silo, z.tolist()))
+        made = np.array(_core.vessel_volume_below(silo, z.tolist()))
     else:
         x, y = FloorMap.middles(floor.reach, len(floor.z))
         inside = np.hypot(x, y) <= silo[0]
@@ -110,7 +109,7 @@ def _volumes(
     return np.asarray(made + courses)
 
 
-def _causes(known: Knowledge, silo: tuple[float, ...], vessel: Vessel) -> Iterator[tuple[str, float, Any]]:
+def _causes(known: Knowledge, silo: CoreVessel, vessel: Vessel) -> Iterator[tuple[str, float, Any]]:
     """Contributions: name, standard deviation, and the volumes with the length moved by it.
 
     The datum is the floor's lowest point and moves with it; correlations between lengths only make the sum smaller.
@@ -123,7 +122,7 @@ def _causes(known: Knowledge, silo: tuple[float, ...], vessel: Vessel) -> Iterat
         lengths = list(silo)
         lengths[place] += by
         lengths[2] = max(lengths[2], lengths[1])
-        return lambda z: _volumes(tuple(lengths), floor, vessel, z + (by if place == 2 else 0.0))
+        return lambda z: _volumes(CoreVessel(*lengths), floor, vessel, z + (by if place == 2 else 0.0))
 
     yield "radius", float(std[4]), moved(0, float(std[4]))
     yield "wall's form", WALL_FORM_STD, moved(0, WALL_FORM_STD)

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
 from siloscope.content.knowledge import Knowledge
+from siloscope.content.setup import CoreVessel
 from siloscope.types.content import Parts
 from siloscope.vessel.datasheet import LENGTH_STD
 
@@ -32,7 +32,7 @@ class Ullage:
     """(10,) by the parameters."""
 
 
-def ullage_of(found: dict[str, Any], known: Knowledge, silo: tuple[float, ...]) -> Ullage | None:
+def ullage_of(found: _core.ContentMeasure, known: Knowledge, silo: CoreVessel) -> Ullage | None:
     """The free space over the surface that the core found; None where the radius is not known.
 
     U = capacity - V with one floor for both, so what lies under the surface cancels: where content covers the floor, U
@@ -40,34 +40,34 @@ def ullage_of(found: dict[str, Any], known: Knowledge, silo: tuple[float, ...]) 
 
     Parameters
     ----------
-    found : dict
+    found : ContentMeasure
         The core's answer, with or without a surface.
     known : Knowledge
         Pose, lengths and their covariance.
-    silo : tuple
+    silo : CoreVessel
         The lengths that the core measured with.
     """
     if known.lengths.cone_only:
         return None
-    filled = 0.0 if found["volume"] is None else float(found["volume"]["volume"])
+    filled = 0.0 if found.volume is None else found.volume.volume
     capacity = _capacity(silo)
     area = math.pi * silo[0] ** 2
-    by = capacity_derivatives(silo) - np.asarray(found["derivatives"])
+    by = capacity_derivatives(silo) - found.derivatives
     top_std = 0.0 if known.lengths.top_from == "camera" else area * LENGTH_STD
     if known.lengths.top_from == "datasheet":
         by[5] -= area  # the edge is placed from the joint
     parts = {name: std_by(by, known.covariance, group) for name, group in GROUPS.items()}
     parts["geometry"] = math.hypot(parts["geometry"], top_std)
-    own = {name: float(found["std"][name]) for name in ("noise", "unseen", "grid")}
+    own = {"noise": found.std.noise, "unseen": found.std.unseen, "grid": found.std.grid}
     total = math.hypot(std_by(by, known.covariance, slice(None)), top_std, *own.values())
     return Ullage(capacity - filled, total, Parts(**parts, **own), by)
 
 
-def _capacity(silo: tuple[float, ...]) -> float:
+def _capacity(silo: CoreVessel) -> float:
     return float(_core.vessel_volume_below(silo, [silo[3]])[0])
 
 
-def capacity_derivatives(silo: tuple[float, ...]) -> NDArray[np.float64]:
+def capacity_derivatives(silo: CoreVessel) -> NDArray[np.float64]:
     """Derivatives (10,) of the capacity by the parameters: only the lengths matter."""
     made = np.zeros(10)
     for parameter, place in ((4, 0), (5, 1), (6, 2)):
@@ -76,13 +76,13 @@ def capacity_derivatives(silo: tuple[float, ...]) -> NDArray[np.float64]:
     return made
 
 
-def _moved(silo: tuple[float, ...], place: int, step: float) -> tuple[float, ...]:
+def _moved(silo: CoreVessel, place: int, step: float) -> CoreVessel:
     """The vessel with one length changed; a flat floor's two ends move together."""
     lengths = list(silo)
     lengths[place] += step
     lengths[2] = max(lengths[1], lengths[2])
     lengths[1] = min(lengths[1], lengths[2])
-    return tuple(lengths)
+    return CoreVessel(*lengths)
 
 
 def std_by(by: NDArray[np.float64], covariance: NDArray[np.float64], group: slice) -> float:

@@ -3,42 +3,38 @@
 from __future__ import annotations
 
 import math
-from dataclasses import fields
-from typing import Any, ClassVar, Protocol
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any
 
 import numpy as np
 
-LINE = 110
-"""Most characters of a value in a `repr`."""
+LINE = 140
+"""Most characters of a value in a `repr`, sentences aside."""
 
 SHOWN = 12
 """Most numbers of an array in a `repr`."""
 
 
-class _Dataclass(Protocol):
-    __dataclass_fields__: ClassVar[dict[str, Any]]
-
-
+@dataclass(frozen=True, eq=False, repr=False)
 class ByValue:
     """Base of frozen dataclasses that hold arrays; give them ``eq=False, repr=False``."""
 
-    def __eq__(self: _Dataclass, other: object) -> bool:
+    def __eq__(self, other: object) -> bool:
         """Whether all fields that take part are the same; arrays by type, shape and entries, NaN being equal to NaN."""
         if type(other) is not type(self):
             return NotImplemented
         compared = (field.name for field in fields(self) if field.compare)
         return all(same(getattr(self, name), getattr(other, name)) for name in compared)
 
-    def __hash__(self: _Dataclass) -> int:
+    def __hash__(self) -> int:
         values = (getattr(self, field.name) for field in fields(self) if field.compare)
         return hash((type(self).__name__, *(value for value in values if isinstance(value, str))))
 
-    def __getstate__(self: _Dataclass) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
-    def __repr__(self: _Dataclass) -> str:
-        told = ((field.name, getattr(self, field.name)) for field in fields(self) if field.repr)
-        lines = [f"    {name}={_shown(value)}," for name, value in told if not _is_empty(value)]
+    def __repr__(self) -> str:
+        lines = [f"    {name}={value}," for name, value in _told(self)]
         return "\n".join([f"{type(self).__name__}(", *lines, ")"])
 
 
@@ -61,14 +57,30 @@ def _same_arrays(a: Any, b: Any) -> bool:
     return np.array_equal(a, b, equal_nan=a.dtype.kind == "f")
 
 
+def _told(value: Any) -> list[tuple[str, str]]:
+    """The fields of a dataclass that hold something, each on one line; a covariance with its deviations."""
+    told = [(field.name, getattr(value, field.name)) for field in fields(value) if field.repr]
+    return [(name, _shown(held) + _deviations(name, held)) for name, held in told if not _is_empty(held)]
+
+
 def _is_empty(value: Any) -> bool:
     return value is None or (isinstance(value, str | tuple | list | dict) and not value)
+
+
+def _deviations(name: str, value: Any) -> str:
+    if not name.endswith("covariance"):
+        return ""
+    return f" of std [{', '.join(format(v, '.2g') for v in np.sqrt(np.diag(value)))}]"
 
 
 def _shown(value: Any) -> str:
     """A value on one line: long arrays, tuples and dictionaries by what they are."""
     if isinstance(value, np.ndarray):
         return _shown_array(value)
+    if isinstance(value, ByValue):
+        return f"{type(value).__name__}(…)"
+    if is_dataclass(value):
+        return _cut(f"{type(value).__name__}({', '.join(f'{name}={held}' for name, held in _told(value))})")
     if isinstance(value, dict):
         return _cut(f"{{{', '.join(f'{key}: {_shown(entry)}' for key, entry in value.items())}}}")
     if isinstance(value, tuple | list):

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from siloscope.parameters import PARAMETERS
 from siloscope.reasons import FRAME_STATUSES
 from siloscope.schema import CALIBRATION
+from siloscope.types.by_value import ByValue
 from siloscope.types.floor import Floor, FloorMap, SeenCone
 from siloscope.types.frame_factor import FrameFactor, SummedFactor
 from siloscope.types.move import Move
@@ -59,8 +60,8 @@ class FrameRecord:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Evidence:
+@dataclass(frozen=True, eq=False, repr=False)
+class Evidence(ByValue):
     """What a calibration rests on, and is continued from."""
 
     frames: tuple[tuple[int, FrameFactor], ...] = ()
@@ -77,8 +78,8 @@ class Evidence:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Calibration:
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(ByValue):
     """Pose of the camera in its silo and the silo's geometry, from many frames. Radians and metres.
 
     A refused calibration (`status` "refused") has no numbers; `reason` and `message` say why.
@@ -107,7 +108,8 @@ class Calibration:
     reason: str | None = None
     message: str | None = None
     config: dict[str, Any] = field(default_factory=dict)
-    timing_ms: dict[str, float] = field(default_factory=dict)
+    timing_ms: dict[str, float] = field(default_factory=dict, compare=False)
+    """Milliseconds by stage; no part of the answer, so it is not compared."""
     evidence: Evidence = field(default_factory=Evidence)
     method: str = "surface"
     floor: Floor = field(default_factory=Floor)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from siloscope.reasons import CONTENT_NOTES, CONTENT_REMARKS
 from siloscope.schema import CONTENT
+from siloscope.types.by_value import ByValue
 from siloscope.types.floor import Floor
 from siloscope.types.surface_map import Shape, SurfaceMap
 from siloscope.types.vessel import Lengths, to_plain
@@ -99,8 +100,8 @@ HIDDEN_ALIKE = 0.2
 """Share of what the unseen leaves that differs from one frame to the next; the rest hides the same in both."""
 
 
-@dataclass(frozen=True, eq=False)
-class Content:
+@dataclass(frozen=True, eq=False, repr=False)
+class Content(ByValue):
     """The content of a silo at one moment. Cubic metres, metres, kilograms, radians.
 
     A refused reading (`status` "refused") has no numbers; `reason` is one of `siloscope.reasons.CONTENT_REMARKS` and
@@ -145,7 +146,8 @@ class Content:
     timestamp: float | None = None
     source: str = "frame"
     config: dict[str, Any] = field(default_factory=dict)
-    timing_ms: dict[str, float] = field(default_factory=dict)
+    timing_ms: dict[str, float] = field(default_factory=dict, compare=False)
+    """Milliseconds by stage; no part of the answer, so it is not compared."""
     surface: SurfaceMap | None = None
 
     @property

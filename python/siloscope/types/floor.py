@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope.types.by_value import ByValue
+
 
 @dataclass(frozen=True)
 class SeenCone:
@@ -23,8 +25,8 @@ class SeenCone:
         return f"{math.degrees(self.angle):.0f}°"
 
 
-@dataclass(frozen=True, eq=False)
-class FloorMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class FloorMap(ByValue):
     """A floor on a square grid, z in the silo frame (downwards), m."""
 
     reach: float
@@ -76,8 +78,8 @@ class FloorMap:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Floor:
+@dataclass(frozen=True, eq=False, repr=False)
+class Floor(ByValue):
     """What is known of the bottom; an unknown one gives no volume."""
 
     kind: str = "unknown"

@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from siloscope import _core
 from siloscope.errors import UsageError
+from siloscope.types.by_value import ByValue
 
 KINDS = {"unseen": 0, "content": 1, "rim": 2, "floor": 3, "other": 4}
 """What a cell of a map shows."""
@@ -36,14 +37,12 @@ class Shape:
     """The same for a profile about the centre."""
 
     @classmethod
-    def of(cls, found: dict[str, Any] | None) -> Shape | None:
-        """From the core's numbers."""
+    def of(cls, found: _core.Shape | None) -> Shape | None:
+        """From the core's numbers, whose slopes are tangents."""
         if found is None:
             return None
-        centre = None if found["centre"] is None else (float(found["centre"][0]), float(found["centre"][1]))
-        flank, steepness = (float(np.arctan(found[key])) for key in ("flank", "steepness"))
-        tilt = (float(found["tilt"][0]), float(found["tilt"][1]))
-        return cls(found["form"], flank, steepness, centre, tilt, found["asymmetry"], found["irregularity"])
+        flank, steepness = (float(np.arctan(slope)) for slope in (found.flank, found.steepness))
+        return cls(found.form, flank, steepness, found.centre, found.tilt, found.asymmetry, found.irregularity)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -58,8 +57,8 @@ class Shape:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class SurfaceMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class SurfaceMap(ByValue):
     """Heights of a surface on square cells, and everywhere between them. Metres, heights upwards.
 
     In a silo, x and y are the silo frame's and heights are over `datum`, the z of height 0. For a bare cloud they are
@@ -77,28 +76,25 @@ class SurfaceMap:
         """(3, 3) rows: the horizontal axes and up, in the axes of the cloud."""
         return np.array(self.core.axes)
 
-    @cached_property
-    def _grid(self) -> tuple[NDArray[np.float64], float, int]:
-        centre, reach, side = self.core.grid
-        return np.array(centre), float(reach), int(side)
-
     @property
     def cell(self) -> float:
         """Side of a cell."""
-        _, reach, side = self._grid
-        return 2.0 * reach / side
+        grid = self.core.grid
+        return 2.0 * grid.reach / grid.side
 
     @cached_property
     def x(self) -> NDArray[np.float64]:
         """(n,) x of the columns' middles."""
-        centre, reach, side = self._grid
-        return np.asarray(centre[0] - reach + (np.arange(side) + 0.5) * self.cell)
+        return self._middles(0)
 
     @cached_property
     def y(self) -> NDArray[np.float64]:
         """(n,) y of the rows' middles."""
-        centre, reach, side = self._grid
-        return np.asarray(centre[1] - reach + (np.arange(side) + 0.5) * self.cell)
+        return self._middles(1)
+
+    def _middles(self, axis: int) -> NDArray[np.float64]:
+        grid = self.core.grid
+        return np.asarray(grid.centre[axis] - grid.reach + (np.arange(grid.side) + 0.5) * self.cell)
 
     @cached_property
     def heights(self) -> NDArray[np.float64]:
@@ -131,7 +127,7 @@ class SurfaceMap:
         xy = np.asarray(places, np.float64)
         if xy.shape[-1:] != (2,):
             raise UsageError(f"places of shape {xy.shape}; give (..., 2)")
-        flat = self.core.z_at(np.ascontiguousarray(xy.reshape(-1, 2)))
+        flat = self.core.z_at(xy.reshape(-1, 2))
         return np.asarray(self.datum - flat).reshape(xy.shape[:-1])
 
     def cells(self, places: ArrayLike) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -8,6 +8,7 @@ from datetime import UTC, datetime
 from typing import Any
 
 from siloscope.schema import TRACK
+from siloscope.types.by_value import ByValue
 from siloscope.types.content import Content
 
 DAY = 86_400.0
@@ -143,8 +144,8 @@ class Use:
         }
 
 
-@dataclass(frozen=True, eq=False)
-class Track:
+@dataclass(frozen=True, eq=False, repr=False)
+class Track(ByValue):
     """The whole story."""
 
     readings: tuple[Reading, ...]

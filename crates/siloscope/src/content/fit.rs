@@ -103,7 +103,7 @@ impl Surface {
 }
 
 /// A place in the trend's units.
-fn unit(grid: &Grid, [x, y, _]: [f64; 3]) -> [f64; 2] {
+pub fn unit(grid: &Grid, [x, y, _]: [f64; 3]) -> [f64; 2] {
     [(x - grid.centre[0]) / grid.reach, (y - grid.centre[1]) / grid.reach]
 }
 

@@ -9,6 +9,7 @@ pub mod cloud;
 pub mod detail;
 pub mod fit;
 pub mod grid;
+pub mod heights;
 pub mod jacobian;
 pub mod roughness;
 pub mod setup;
