@@ -63,7 +63,7 @@ def test_a_quarter_of_the_pixels_says_the_same_with_twice_the_deviation(known: d
     for scene in discharge(SILO3, 6, 0.4, 0.05):
         few = decimated(frame(scene), None)
         assert few is not None
-        one, other = locate(frame(scene), **known), locate(few, **known)
+        one, other = (locate(seen, vessels="coaxial", **known) for seen in (frame(scene), few))
         assert one.covariance is not None
         assert other.covariance is not None
         std = np.sqrt(np.diag(other.covariance))

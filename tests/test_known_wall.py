@@ -6,12 +6,14 @@ import functools
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
-from siloscope import Calibration, Estimate, Frame, calibrate, locate
+import siloscope
+from siloscope import Calibration, Estimate, Frame, calibrate
 from siloscope.fusion.schedule import FULL_SEARCH_PERIOD
 from siloscope.simulation import ASTRA_S, Defects, Feed, Scene, discharge
 from siloscope.simulation.scenarios import scenario
@@ -32,6 +34,10 @@ def frame(scene: Scene) -> Frame:
 @functools.cache
 def located(scene: Scene, sensor: str | None = PROFILE, diameter: float | None = None) -> Estimate:
     return locate(frame(scene), sensor=sensor, diameter=diameter)
+
+
+locate = partial(siloscope.locate, vessels="coaxial")
+"""As frames are located that are fused: the laws of this file are those of the warm start in that model."""
 
 
 def emptying(name: str, feed: str, steps: int = 7, defects: Defects | None = None) -> tuple[Scene, ...]:

@@ -23,7 +23,7 @@ from siloscope.io.writers import write_camera, write_png
 from siloscope.sensors.live import SensorProcess, sensor, turn_for_more_wall
 from siloscope.sensors.live.realsense import RealSense
 from siloscope.simulation import Feed
-from siloscope.simulation.scenarios import SILO3
+from siloscope.simulation.scenarios import SILO1, SILO3
 
 DATA = Path(__file__).parent / "data"
 
@@ -272,7 +272,7 @@ def test_live_shows_a_panel_on_stderr_and_tells_of_damage(tmp_path: Path, capsys
 
 
 def test_live_replays_raw_images_with_their_unit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    seen = SILO3.render()
+    seen = SILO1.render()
     write_png(tmp_path / "frame.png", seen.raw(0.001))
     write_camera(seen.camera, tmp_path / "camera.json")
     frame = str(tmp_path / "frame.png")

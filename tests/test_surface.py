@@ -208,3 +208,11 @@ def test_a_gravity_prior_pulls_the_axis_by_its_weight() -> None:
     assert abs(free.pose.r_x - scene.pose.r_x) < 1e-4
     assert held.pose.r_x - scene.pose.r_x == pytest.approx(0.01, abs=1e-3)
     assert held.to_dict()["gravity"]["r_x"] == pytest.approx(scene.pose.r_x + 0.01, abs=1e-9)
+
+
+def test_gravity_that_contradicts_the_wall_is_refused() -> None:
+    scene = replace(scenario("silo1"), sensor=ASTRA_S)
+    depth = np.nan_to_num(scene.render().measured).astype(np.float32)
+    tilted = SiloPose(scene.pose.r_x + 0.01, scene.pose.r_y, 0, 0).axis_direction
+    priors = Priors(sensors.load("orbbec-astra-s"), gravity=tilted, gravity_std=1e-4, any_vessel=True)
+    assert fit_depth(depth, scene.camera, priors).reason == "gravity-contradicts"

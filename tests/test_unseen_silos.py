@@ -65,7 +65,9 @@ class Verdict:
 def judged(scene: Scene, kind: Kind) -> Verdict | None:
     """The answer for a scene; None where it is refused."""
     diameter = 2.0 * scene.silo.radius if kind.diameter else None
-    found = siloscope.locate(scene.render(threads=2).frame(), sensor=kind.sensor, diameter=diameter).to_dict()
+    found = siloscope.locate(
+        scene.render(threads=2).frame(), sensor=kind.sensor, diameter=diameter, vessels="coaxial"
+    ).to_dict()
     if found["status"] != "ok":
         return None
     stated, stds = {**found["silo"], **found}, {**found["silo"]["std"], **found["std"]}

@@ -17,6 +17,7 @@ from siloscope.sensors import SensorProfile
 from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
+from siloscope.types.intrinsics import IntrinsicsStd
 
 
 def locate(
@@ -35,6 +36,8 @@ def locate(
     threads: int = 1,
     start: Estimate | None = None,
     ratios: bool = True,
+    intrinsics: str | IntrinsicsStd | None = None,
+    vessels: str = "any",
 ) -> Estimate:
     """Find the silo's axis in one frame, and with it the camera's pose (Eqs. 5–7).
 
@@ -70,6 +73,12 @@ def locate(
         looked for there first, which is quicker; a frame that does not plainly confirm it is searched as without.
     ratios : bool
         Whether to work out how much of the frame is cylinder, cone and feed (method ``surface``).
+    intrinsics : {"exact", "calibrated", "nominal"} or IntrinsicsStd, optional
+        How exactly the intrinsics are known (method ``surface``): "calibrated" where a camera is given or recorded,
+        "nominal" where the sensor profile's own are used.
+    vessels : {"any", "coaxial"}
+        Which vessels may be in view (method ``surface``, depth images from inside): those of the joint fit, which
+        compete, or a cylinder on a coaxial cone seen through exact intrinsics, the model in which frames are fused.
 
     Returns
     -------
@@ -96,6 +105,8 @@ def locate(
         threads=threads,
         start=start,
         ratios=ratios,
+        intrinsics=intrinsics,
+        vessels=vessels,
     )
     prepared = prepare(data, camera, profile, depth_unit=depth_unit, mask=mask, crop=crop)
     settings = settings.with_gravity_of(prepared)

@@ -102,8 +102,7 @@ def measure(
     moisture : float, optional
         Of the feed, as a fraction of its wet mass: the answer then has the dry matter too.
     pose : SiloPose, optional
-        The camera's pose where no calibration tells it, as for a bin that is not round: its outline is in the vessel
-        file.
+        The camera's pose where no calibration tells it, for a bin that is not round: its outline is in the vessel file.
     mask : array of bool, optional
         True where the silo is.
     previous : Content, optional
@@ -135,7 +134,8 @@ def measure(
         placed = pose or pose_of(calibration)
         return replace(outlined(prepared, placed, about, profile, chosen, source_of(data)), moisture=moisture)
     if calibration is None:
-        estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask)
+        estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask,
+                          vessels="coaxial")  # fmt: skip
         if not estimate.ok:
             return unlocated(data, estimate)
         silo = calibrate([estimate], sensor=profile, diameter=sheet.diameter)
@@ -146,5 +146,5 @@ def measure(
     prepared = prepare(data, camera_of(data, camera, silo), profile or sensors.UNKNOWN,
                        depth_unit=depth_unit, mask=mask)  # fmt: skip
     request = Request(data, known, sheet, table, chosen, previous, calibration is None)
-    content = content_in_silo(prepared, silo, about, request, 1e3 * (time.perf_counter() - start))
-    return replace(content, moisture=moisture)
+    ms = 1e3 * (time.perf_counter() - start)
+    return replace(content_in_silo(prepared, silo, about, request, ms), moisture=moisture)

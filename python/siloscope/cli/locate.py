@@ -44,6 +44,7 @@ def locate(
         int | None, typer.Option(help="Neighbours for normals and shape tensors; 30 unless given.")
     ] = None,
     gravity: options.Gravity = None,
+    intrinsics: options.Intrinsics = None,
     number: Annotated[int, typer.Option("--frame", min=0, help="Which frame of several, from 0.")] = 0,
     stream: options.Stream = None,
     threads: options.Threads = None,
@@ -63,7 +64,7 @@ def locate(
     box = None if crop is None else options.numbers(crop, 6, "--crop")
     chosen = selection(frame, mask, label)
     settings: dict[str, Any] = {"method": method, "sensor": sensor, "diameter": diameter, "threads": threads}
-    settings |= {"grid": grid, "neighbours": neighbours}
+    settings |= {"grid": grid, "neighbours": neighbours, "intrinsics": intrinsics}
     settings["gravity"] = None if gravity is None else options.numbers(gravity, 3, "--gravity")
     given = {name: value for name, value in settings.items() if value is not None}
     estimate = siloscope.locate(frame, mask=chosen, crop=box, **given)

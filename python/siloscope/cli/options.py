@@ -27,6 +27,10 @@ Diameter = Annotated[
 Gravity = Annotated[
     str | None, typer.Option("--gravity", metavar="X,Y,Z", help="Gravity in the camera frame, from an accelerometer.")
 ]
+Intrinsics = Annotated[
+    str | None,
+    typer.Option("--intrinsics", metavar="exact|calibrated|nominal", help="How exactly the intrinsics are known."),
+]
 Bottom = Annotated[
     str | None, typer.Option("--bottom", metavar="KIND", help="cone: the cone seen is the bottom; flat; unknown.")
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 from siloscope.estimation import shape_tensor, surface
@@ -17,6 +18,9 @@ def _surface(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Est
     priors = Priors(profile, settings.diameter, settings.gravity)
     if isinstance(frame, PreparedPoints):
         return surface.fit_points(frame.points, priors, grid=settings.grid, threads=settings.threads, config=config)
+    if settings.vessels == "any":
+        camera_std = settings.intrinsics_std(frame).of_rays(frame.camera)
+        priors = replace(priors, any_vessel=True, camera_std=camera_std)
     start, ratios = settings.start, settings.ratios
     return surface.fit_depth(frame.depth, frame.camera, priors, start=start, ratios=ratios, config=config)
 

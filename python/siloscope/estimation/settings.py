@@ -13,8 +13,12 @@ from siloscope.estimation.inputs import Prepared, PreparedDepth
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import is_number
 from siloscope.types.estimate import Estimate
+from siloscope.types.intrinsics import EXACT, NAMES, IntrinsicsStd, named
 
 Number = float | None
+
+VESSELS = ("any", "coaxial")
+"""Which vessels may be in view."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,8 @@ class Settings:
     threads: int
     start: Estimate | None
     ratios: bool
+    intrinsics: str | IntrinsicsStd | None
+    vessels: str
 
     @classmethod
     def checked(
@@ -42,6 +48,8 @@ class Settings:
         threads: int,
         start: Estimate | None,
         ratios: bool,
+        intrinsics: str | IntrinsicsStd | None,
+        vessels: str,
     ) -> Settings:
         """Raises `UsageError` for a setting outside its bounds."""
         return cls(
@@ -53,6 +61,8 @@ class Settings:
             _whole("threads", threads, 1, 256),
             start,
             ratios,
+            intrinsics if isinstance(intrinsics, IntrinsicsStd | None) else _one_of("intrinsics", intrinsics, NAMES),
+            _one_of("vessels", vessels, VESSELS),
         )
 
     def with_gravity_of(self, prepared: Prepared) -> Settings:
@@ -60,6 +70,15 @@ class Settings:
         if self.gravity is not None or prepared.gravity is None:
             return self
         return replace(self, gravity=_direction(prepared.gravity))
+
+    def intrinsics_std(self, frame: PreparedDepth) -> IntrinsicsStd:
+        """How exactly the intrinsics of a frame are known."""
+        if self.vessels == "coaxial":
+            return EXACT
+        if isinstance(self.intrinsics, IntrinsicsStd):
+            return self.intrinsics
+        own = "nominal" if "intrinsics" in frame.config else "calibrated"
+        return named(self.intrinsics or own, frame.camera)
 
     def effective(self, method: str, prepared: Prepared) -> dict[str, Any]:
         """The effective settings, written beside every result."""
@@ -72,8 +91,16 @@ class Settings:
             "neighbours": self.neighbours,
             "threads": self.threads,
             "camera": prepared.camera.to_dict() if isinstance(prepared, PreparedDepth) else None,
+            "vessels": self.vessels,
+            "intrinsics_std": self.intrinsics_std(prepared).to_dict() if isinstance(prepared, PreparedDepth) else None,
             **prepared.config,
         }
+
+
+def _one_of(name: str, value: str, known: tuple[str, ...]) -> str:
+    if value not in known:
+        raise UsageError(f"unknown {name} '{value}'; known are {', '.join(known)}")
+    return value
 
 
 def _bounded(name: str, value: Number, least: float, most: float) -> Number:

@@ -93,6 +93,8 @@ def _estimate(
     cone = None if slope is None or intercept is None else (slope, intercept)
     silo, silo_std = geometry_of(values["radius"], cone, covariance)
     extra = {"sensor": _sensor(fit, covariance, priors), "fit": _quality(fit, slope)}
+    if fit.models:
+        extra |= _vessels(fit)
     if priors.gravity is not None:
         extra["gravity"] = _gravity_check(pose, priors.gravity)
     seen = fit.coverage
@@ -111,6 +113,15 @@ def _estimate(
         evidence=_factor(fit, priors),
         details=SurfaceDetails(fit.points, fit.residuals, fit.warm_start, labels),
     )
+
+
+def _vessels(fit: _core.SurfaceFit) -> dict[str, Any]:
+    """The vessel models with their probabilities, and the deviations without what a camera's frames have in common."""
+    relative = np.sqrt(np.diag(fit.covariance_relative))[:4]
+    return {
+        "models": [{"model": name, "probability": probability} for name, probability in fit.models],
+        "std_relative": dict(zip(PARAMETERS[:4], relative.tolist(), strict=True)),
+    }
 
 
 def _sensor(fit: _core.SurfaceFit, covariance: NDArray[np.float64], priors: Priors) -> dict[str, Any]:

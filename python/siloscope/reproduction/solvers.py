@@ -24,7 +24,7 @@ class Solver:
     """Side of the voxels in radii of the silo; None for the method's own."""
 
     def __call__(self, frame: SimulatedFrame, profile: SensorProfile, **more: Any) -> Estimate:
-        """The pose of a frame taken with a sensor of this profile."""
+        """The pose of a frame taken with a sensor of this profile; the paper's silos are known to be coaxial."""
         known: dict[str, Any] = dict(more)
         if self.knows_diameter:
             known["diameter"] = 2.0 * frame.scene.silo.radius
@@ -32,7 +32,7 @@ class Solver:
             known["sensor"] = profile
         if self.grid_per_radius is not None:
             known["grid"] = self.grid_per_radius * frame.scene.silo.radius
-        return locate(frame.measured, frame.camera, method=self.method, **known)
+        return locate(frame.measured, frame.camera, method=self.method, vessels="coaxial", **known)
 
 
 SOLVERS = {

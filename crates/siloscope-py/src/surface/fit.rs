@@ -81,6 +81,19 @@ impl SurfaceFit {
         PyArray1::from_slice(py, &self.fit.residuals)
     }
 
+    /// Vessel models that were weighed, with their probabilities; none for clouds and views from outside.
+    #[getter]
+    fn models(&self) -> Vec<(&'static str, f64)> {
+        let models = self.fit.joint.as_ref().map(|joint| joint.answer.models.as_slice());
+        models.unwrap_or_default().iter().map(|(model, probability)| (model.slug(), *probability)).collect()
+    }
+
+    /// Covariance (12, 12) if the intrinsics were exact: without what all frames of a camera have in common.
+    #[getter]
+    fn covariance_relative<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        matrix(py, self.fit.joint.as_ref().map_or(&self.fit.covariance, |joint| &joint.answer.relative))
+    }
+
     /// What was measured on the wall's tiles.
     #[getter]
     fn diagnostics(&self) -> WallDiagnostics {

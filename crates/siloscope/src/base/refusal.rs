@@ -21,11 +21,19 @@ pub enum Refusal {
     PositionUnknown,
     /// Wall that fixes where the axis runs, but not its direction.
     DirectionUnknown,
+    /// A cone without cylinder wall: its axis need not be the silo's.
+    ConeAlone,
+    /// The wall departs from a cylinder by more than a wall's form.
+    Deformed,
+    /// Vessels that explain the frame alike have different axes.
+    AmbiguousVessel,
+    /// The axis contradicts the given gravity.
+    GravityContradicts,
 }
 
 impl Refusal {
     /// Every reason.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 13] = [
         Self::NoDepth,
         Self::NoWall,
         Self::Flat,
@@ -35,6 +43,10 @@ impl Refusal {
         Self::PoorlyDetermined,
         Self::PositionUnknown,
         Self::DirectionUnknown,
+        Self::ConeAlone,
+        Self::Deformed,
+        Self::AmbiguousVessel,
+        Self::GravityContradicts,
     ];
 
     /// Stable name, what it means, and what to try.
@@ -84,6 +96,26 @@ impl Refusal {
                 "direction-unknown",
                 "the wall in view tells where the axis runs, but not how it is directed",
                 "turn the camera so that more of the wall's height is in view, or give gravity",
+            ),
+            Self::ConeAlone => (
+                "cone-alone",
+                "only a cone is in view; it may be oblique, or feed, and its axis need not be the silo's",
+                "turn the camera so that cylinder wall is in view, or give gravity",
+            ),
+            Self::Deformed => (
+                "deformed-wall",
+                "what could be wall departs from a cylinder by more than a wall's own form",
+                "wait until the wall is clean of feed that sticks to it, or mask what is not wall",
+            ),
+            Self::AmbiguousVessel => (
+                "ambiguous-vessel",
+                "vessels of different shapes, with different axes, explain the frame alike",
+                "wait until the level has fallen, or turn the camera so that more of the cylinder is in view",
+            ),
+            Self::GravityContradicts => (
+                "gravity-contradicts",
+                "the wall's axis contradicts the given gravity by more than five standard deviations",
+                "check gravity's signs and the camera's axes, or leave gravity out",
             ),
         }
     }

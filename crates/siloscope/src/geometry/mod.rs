@@ -1,6 +1,7 @@
 //! What a silo, a camera and its sensor are.
 
 pub mod camera;
+pub mod convex_vessel;
 pub mod depth_image;
 pub mod evaluator;
 pub mod label;

@@ -8,6 +8,7 @@ pub mod diagnostics;
 pub mod equation;
 pub mod factor;
 pub mod grain;
+pub mod joint;
 pub mod likelihood;
 mod misfit;
 pub mod model_selection;
@@ -46,6 +47,7 @@ use crate::surface_fit::covariance::{
 use crate::surface_fit::diagnostics::WallEvidence;
 use crate::surface_fit::factor::{frame_factor, some_rays};
 use crate::surface_fit::grain::relief_with_grain;
+use crate::surface_fit::joint::{JointSummary, fit_inside};
 use crate::surface_fit::likelihood::may_be_feed;
 use crate::surface_fit::model_selection::{Settled, coarse_fit, drop_film};
 use crate::surface_fit::parts::change_without_a_part;
@@ -63,6 +65,20 @@ pub struct Knowledge {
     pub radius: Option<(f64, f64)>,
     /// Direction of gravity in the camera frame and its standard deviation, radians.
     pub gravity: Option<(Vec3, f64)>,
+    /// Which vessels may be in view.
+    pub vessels: Vessels,
+}
+
+/// Which vessels an image may show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Vessels {
+    /// A cylinder on a coaxial cone, seen through exact intrinsics: the model in which frames are fused.
+    Coaxial,
+    /// Those of the joint fit, which compete.
+    Any {
+        /// Standard deviations of the intrinsics: focal lengths (relative), principal point (rays), k1; 0 where exact.
+        camera_std: [f64; 5],
+    },
 }
 
 /// Result of the fit, before it is judged.
@@ -90,6 +106,8 @@ pub struct SurfaceFit {
     pub residuals: Vec<f64>,
     /// Milliseconds of each stage, in order.
     pub timing: Vec<(&'static str, f64)>,
+    /// What the joint fit says beside the wall; `None` where the vessel is a coaxial one, for clouds and views from outside.
+    pub joint: Option<Box<JointSummary>>,
 }
 
 /// How far a wall that shows ovality, and so is no ideal one, lies off its mean over a block of tiles, metres.
@@ -124,21 +142,40 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge, known: Option<&KnownWall>
         let found = confirmed(&mut patches, noise, &prior, pixel, wall);
         clock.lap("known wall");
         let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-        measured(problem, image, know, found?, Looks::None, &mut clock).ok().filter(|fit| fit.confirms(wall))
+        let from = (found?, Looks::None, [].as_slice());
+        fit_from(problem, image, know, from, &mut clock).ok().filter(|fit| fit.confirms(wall))
     });
     let mut result = match confirmed {
         Some(fit) => fit,
         None => {
             patches.unbias_normals(&know.error.bias);
-            let found = coarse_fit(&mut patches, noise, &prior, pixel)?;
+            let (found, proposals) = coarse_fit(&mut patches, noise, &prior, pixel);
             clock.lap("coarse fit");
             let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-            measured(problem, image, know, found, Looks::Usual, &mut clock)?
+            match found {
+                Ok(found) => fit_from(problem, image, know, (found, Looks::Usual, &proposals), &mut clock)?,
+                Err(why) if know.vessels == Vessels::Coaxial => return Err(why),
+                Err(why) => fit_inside(&problem, image, know, None, &proposals, &mut clock).map_err(|_| why)?,
+            }
         }
     };
     result.timing = clock.laps();
     result.patches = patches;
     Ok(result)
+}
+
+/// The vessel from a wall found on tiles: by the joint fit, or by its pixels where it is a coaxial one or seen from outside.
+fn fit_from(
+    problem: Problem,
+    image: &DepthImage,
+    know: &Knowledge,
+    (found, looks, proposals): (Settled, Looks, &[Fit]),
+    clock: &mut Clock,
+) -> Outcome {
+    match know.vessels {
+        Vessels::Any { .. } if found.fit.inside => fit_inside(&problem, image, know, Some(found), proposals, clock),
+        _ => measured(problem, image, know, found, looks, clock),
+    }
 }
 
 /// The wall that patches have settled on, measured by its pixels.
@@ -227,9 +264,9 @@ fn on_pixels(
 }
 
 /// Largest standard deviation of the axis' direction that still is an answer, radians.
-const MAX_DIRECTION_STD: f64 = 0.02;
+pub(crate) const MAX_DIRECTION_STD: f64 = 0.02;
 /// Largest standard deviation of the axis' position that still is an answer, as a share of the radius.
-const MAX_POSITION_STD: f64 = 0.05;
+pub(crate) const MAX_POSITION_STD: f64 = 0.05;
 
 impl SurfaceFit {
     /// Centres of the patches in the silo frame, freed from the depth bias: what the r–z profile shows.
@@ -274,7 +311,7 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
     let exact = DepthError { bias: DepthBias::default(), bias_std: [0.0; 3], noise: None };
     let prior = prior(&Knowledge { error: exact, ..know.clone() });
     let noise = NoiseLaw::uniform(1e-3); // not used: patches of a cloud carry their own scatter
-    let found = match coarse_fit(&mut patches, noise, &prior, 0.0) {
+    let found = match coarse_fit(&mut patches, noise, &prior, 0.0).0 {
         Ok(found) => found,
         Err(refusal) => return Ok(Err(refusal)),
     };
@@ -312,7 +349,7 @@ fn prior(know: &Knowledge) -> Prior {
 }
 
 /// Whether the axis is known well enough: its direction, and its position in the middle of the wall that was seen.
-fn check_determined(
+pub(crate) fn check_determined(
     covariance: &Information,
     placed: &SurfaceEvaluator,
     height: f64,
@@ -376,6 +413,7 @@ fn finish(
         residuals,
         fit,
         timing: Vec::new(),
+        joint: None,
     })
 }
 

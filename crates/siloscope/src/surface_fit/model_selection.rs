@@ -29,17 +29,25 @@ pub struct Settled {
 ///
 /// The depth scale stays fixed here: it trades against the silo's size along a curve on which Gauss–Newton steps crawl.
 /// A known radius then moves the answer along that curve exactly.
-pub fn coarse_fit(patches: &mut Patches, noise: NoiseLaw, prior: &Prior, pixel: f64) -> Result<Settled, Refusal> {
+pub fn coarse_fit(
+    patches: &mut Patches,
+    noise: NoiseLaw,
+    prior: &Prior,
+    pixel: f64,
+) -> (Result<Settled, Refusal>, Vec<Fit>) {
     let free_size = with_free_size(prior);
     if patches.cloud {
         let found = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Unknown);
-        return best_settled(patches, noise, (&free_size, pixel), found);
+        return (best_settled(patches, noise, (&free_size, pixel), found), Vec::new());
     }
-    let from_inside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Inside);
-    best_settled(patches, noise, (&free_size, pixel), from_inside).or_else(|refusal| {
+    let mut from_inside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Inside);
+    from_inside.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let proposals = from_inside.iter().map(|(_, fit)| fit.clone()).collect();
+    let found = best_settled(patches, noise, (&free_size, pixel), from_inside).or_else(|refusal| {
         let from_outside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Outside);
         best_settled(patches, noise, (&free_size, pixel), from_outside).map_err(|_| refusal)
-    })
+    });
+    (found, proposals)
 }
 
 /// The prior without a known radius, where the depth scale is not known either.
@@ -155,7 +163,7 @@ const BODY_SHARE: f64 = 0.2;
 ///
 /// Tiles of an image measure it to a hundredth; the normals of a cloud come from few points, and both bend and turn less
 /// than their surface.
-fn judge(e: &WallEvidence, inside: bool, cloud: bool) -> Result<(), Refusal> {
+pub(crate) fn judge(e: &WallEvidence, inside: bool, cloud: bool) -> Result<(), Refusal> {
     let too_small = !inside && !cloud && e.share < BODY_SHARE; // a pipe or an auger in view, not what one looks at
     if e.patches < 20 || e.arc < 0.5 || too_small {
         return Err(Refusal::NoWall);
@@ -188,7 +196,7 @@ fn with_other_part(problem: &Problem, fit: Fit) -> Fit {
     if likelihood(problem, &both, 1) > before { both } else { fit }
 }
 
-fn oriented(problem: &Problem, bias: &DepthBias) -> Vec<Oriented> {
+pub(crate) fn oriented(problem: &Problem, bias: &DepthBias) -> Vec<Oriented> {
     let usable = problem.patches.list.iter().filter(|p| p.smooth && p.sigma_normal < 0.3);
     usable
         .map(|p| {

@@ -35,15 +35,28 @@ pub fn tile_residual(
     bias: &DepthBias,
     sampling: Sampling,
 ) -> TileResidual {
-    let (patch, side) = (&patches.list[i], patches.side);
-    let corner = patch.tile.1 as usize * side * image.width + patch.tile.0 as usize * side;
-    let tile = Tile { image, patch, corner, side, rays: &patches.rays[i], bias, sampling };
+    let tile = Tile::of(image, patches, i, bias, sampling);
+    let on_part = |ray: [f64; 2], d: f64| (placed.down(ray) * d < placed.bottom()) == (part == Part::Cylinder);
     match (part, placed.surface.ovality == [0.0; 2]) {
-        (Part::Cylinder, true) => tile.residual(placed, part, |q| placed.cylinder_depth(q)),
-        (Part::Cone, true) => tile.residual(placed, part, |q| placed.cone_depth(q)),
-        (Part::Cylinder, false) => tile.residual(placed, part, |q| placed.rounded(q, placed.cylinder_depth(q), part)),
-        (Part::Cone, false) => tile.residual(placed, part, |q| placed.rounded(q, placed.cone_depth(q), part)),
+        (Part::Cylinder, true) => tile.residual(on_part, |q| placed.cylinder_depth(q)),
+        (Part::Cone, true) => tile.residual(on_part, |q| placed.cone_depth(q)),
+        (Part::Cylinder, false) => tile.residual(on_part, |q| placed.rounded(q, placed.cylinder_depth(q), part)),
+        (Part::Cone, false) => tile.residual(on_part, |q| placed.rounded(q, placed.cone_depth(q), part)),
     }
+}
+
+/// Mean residual of tile `i` over its pixels against a wall whose true depth on a ray is `depth`, where `on_part` tells
+/// whether a ray ends there.
+pub fn tile_residual_against(
+    image: &DepthImage,
+    patches: &Patches,
+    i: usize,
+    bias: &DepthBias,
+    sampling: Sampling,
+    on_part: impl Fn([f64; 2], f64) -> bool,
+    depth: impl Fn([f64; 2]) -> f64,
+) -> TileResidual {
+    Tile::of(image, patches, i, bias, sampling).residual(on_part, depth)
 }
 
 struct Tile<'a> {
@@ -61,10 +74,15 @@ struct Tile<'a> {
 /// The nine lie symmetrically, so that the cubic rest has no mean over the tile, and only the mean is used.
 const QUADRATIC_REST: f64 = 5e-5;
 
-impl Tile<'_> {
+impl<'a> Tile<'a> {
+    fn of(image: &'a DepthImage<'a>, patches: &'a Patches, i: usize, bias: &'a DepthBias, sampling: Sampling) -> Self {
+        let (patch, side) = (&patches.list[i], patches.side);
+        let corner = patch.tile.1 as usize * side * image.width + patch.tile.0 as usize * side;
+        Self { image, patch, corner, side, rays: &patches.rays[i], bias, sampling }
+    }
+
     #[inline(always)]
-    fn residual(&self, placed: &SurfaceEvaluator, part: Part, depth: impl Fn([f64; 2]) -> f64) -> TileResidual {
-        let on_part = |ray: [f64; 2], d: f64| (placed.down(ray) * d < placed.bottom()) == (part == Part::Cylinder);
+    fn residual(&self, on_part: impl Fn([f64; 2], f64) -> bool, depth: impl Fn([f64; 2]) -> f64) -> TileResidual {
         let (mut nodes, mut whole) = ([0.0; 9], true);
         for (measured, ray) in nodes.iter_mut().zip(self.rays.nodes()) {
             let d = depth(ray);

@@ -1,0 +1,240 @@
+//! Which fits are run: from the tile stage's answer where that is certain, else from every proposal anew.
+
+use crate::geometry::surface::{Part, SiloSurface, SurfaceTolerance};
+use crate::surface_fit::joint::model::Model;
+use crate::surface_fit::joint::parameters::{
+    BIAS, CYLINDER_FORM, INTERCEPT, JointState, OBLIQUITY, OFFSET, RADIUS, SIZE, SLOPE,
+};
+use crate::surface_fit::joint::select::{Weighed, weigh};
+use crate::surface_fit::joint::solve::{Frame, JointFit, Schedule};
+use crate::surface_fit::solver::Fit;
+
+/// From a wall that is known to a millimetre.
+const NEAR: Schedule = Schedule { annealed: 0, sketched: 0, pixels: 3 };
+/// From a proposal: model error falls from a fraction of the radius.
+const ANNEALED: Schedule = Schedule { annealed: 9, sketched: 0, pixels: 0 };
+/// The rest of it.
+const FINISH: Schedule = Schedule { annealed: 0, sketched: 4, pixels: 2 };
+/// Another model from there.
+const AGAIN: Schedule = Schedule { annealed: 0, sketched: 2, pixels: 2 };
+/// First model error of a proposal, as a fraction of the radius.
+const FIRST_TAU: f64 = 0.04;
+/// Most proposals that are run.
+const PROPOSALS: usize = 3;
+
+/// Log-likelihood of a ninth of the tiles by which a cylinder with a cone leaves one without no chance.
+const DECISIVE: f64 = 150.0;
+/// A model that is more probable than this leaves no other a say.
+const CERTAIN: f64 = 0.999;
+/// Least arc of the cylinder, as a fraction of the circle, and least fraction of the tiles.
+pub const LEAST_ARC: f64 = 0.25;
+const LEAST_CYLINDER: f64 = 0.08;
+/// Least fraction of the tiles that must be wall.
+const LEAST_WALL: f64 = 0.08;
+/// Most that a wall's tiles are off by without another model being asked, metres and as a fraction of the radius.
+const PLAIN_TAU: f64 = 1.5e-3;
+/// Most correlation of its residuals.
+const PLAIN_CORRELATION: f64 = 8.0;
+/// Most smooth tiles too steep for feed that no model explains, as a fraction of the wall's.
+const PLAIN_STEEP: f64 = 0.03;
+/// Feed lies less steep: the steepest drained angles of repose are 45°. Cosine of 48°.
+const STEEP_COSINE: f64 = 0.669;
+
+/// The fits of a frame and their weights, best first.
+#[derive(Debug, Clone)]
+pub struct Search {
+    /// The fits.
+    pub fits: Vec<JointFit>,
+    /// The models.
+    pub weighed: Vec<Weighed>,
+}
+
+/// The state of a tile fit.
+pub fn state_of(fit: &Fit) -> JointState {
+    let SiloSurface { pose, radius, cone, ovality } = fit.surface;
+    let mut x = [0.0; SIZE];
+    x[..4].copy_from_slice(&[pose.r_x, pose.r_y, pose.t_x, pose.t_y]);
+    x[BIAS..BIAS + 3].copy_from_slice(&[fit.bias.offset, fit.bias.scale, fit.bias.quadratic]);
+    if let Some(radius) = radius {
+        x[RADIUS] = radius;
+        x[OVAL_COLUMN] = radius * ovality[0];
+        x[OVAL_COLUMN + 1] = radius * ovality[1];
+    }
+    if let Some(cone) = cone {
+        (x[SLOPE], x[INTERCEPT]) = (cone.slope, cone.intercept());
+    }
+    let mut state = JointState { x, has_cylinder: radius.is_some(), has_cone: cone.is_some(), reference: 1.0 };
+    state.reference = if state.has_cylinder && state.has_cone { state.joint().clamp(0.2, 60.0) } else { 1.0 };
+    state
+}
+
+/// Column of the cylinder's ovality, the same at all heights: after the rings' 8 and the bend's 8.
+pub const OVAL_COLUMN: usize = CYLINDER_FORM + 16;
+
+/// Runs the fits: `near` is a wall found on tiles, `proposals` are rougher ones.
+pub fn search(
+    frame: &Frame,
+    near: Option<&Fit>,
+    proposals: &[Fit],
+    other_part: impl Fn(&SiloSurface) -> Option<SiloSurface>,
+) -> Search {
+    let mut fits = Vec::new();
+    if let Some(fit) = near {
+        let state = state_of(fit);
+        let model = default_model(&state);
+        fits.extend(JointFit::start(model, state, fit.misfit.max(2e-4)).run(frame, &NEAR));
+        let weighed = weigh(frame, &fits);
+        if fits.first().is_some_and(|fit| is_certain(frame, fit, &weighed)) {
+            return Search { fits, weighed };
+        }
+    }
+    let starts = distinct(near, proposals);
+    let mut both = Vec::new();
+    let mut alone = Vec::new();
+    let mut cones = Vec::new();
+    for start in starts {
+        let state = state_of(start);
+        let with_cone =
+            if state.has_cylinder && !state.has_cone { other_part(&start.surface) } else { Some(start.surface) };
+        if let Some(surface) = with_cone.filter(|s| s.cone.is_some() && s.radius.is_some()) {
+            both.extend(anneal(frame, Model::FreeCone, state_of(&Fit { surface, ..start.clone() })));
+        }
+        if state.has_cylinder {
+            alone.extend(anneal(frame, Model::Cylinder, without(&state, Part::Cone)));
+        }
+        if state.has_cone {
+            cones.push(without(&state, Part::Cylinder));
+        }
+    }
+    let weak = both.iter().all(is_cylinder_weak);
+    let (score, other) = (best_score(&both), best_score(&alone));
+    if weak {
+        let cone_alone = cones.into_iter().filter_map(|state| anneal(frame, Model::ConeAlone, state)).collect();
+        fits.extend(finished(frame, cone_alone));
+    }
+    fits.extend(finished(frame, both));
+    if weak || other > score - DECISIVE {
+        fits.extend(finished(frame, alone));
+    }
+    fits.retain(|fit| wall_tiles(fit).iter().sum::<f64>() > LEAST_WALL * tiles_met(fit));
+    let mut weighed = weigh(frame, &fits);
+    // a model's own widths are learned under its own prior
+    let again = weighed.first().filter(|best| fits[best.fit].model != best.model).and_then(|best| {
+        let mut again = JointFit { model: best.model, ..fits[best.fit].clone() };
+        again.state.x = best.mean;
+        again.run(frame, &AGAIN)
+    });
+    if let Some(again) = again {
+        fits.push(again);
+        weighed = weigh(frame, &fits);
+    }
+    Search { weighed, fits }
+}
+
+/// Proposals that would lead to the same answer are run once.
+fn distinct<'a>(near: Option<&'a Fit>, proposals: &'a [Fit]) -> Vec<&'a Fit> {
+    const SAME: SurfaceTolerance = SurfaceTolerance { tilt: 0.06, shift: 0.15, radius: 0.1, slope: 0.15, apex: 0.3 };
+    let mut starts: Vec<&Fit> = Vec::new();
+    for fit in near.into_iter().chain(proposals) {
+        if starts.len() < PROPOSALS && !starts.iter().any(|other| fit.surface.is_near(&other.surface, &SAME)) {
+            starts.push(fit);
+        }
+    }
+    starts
+}
+
+/// The best of annealed fits, finished on all tiles and on pixels.
+fn finished(frame: &Frame, runs: Vec<JointFit>) -> Option<JointFit> {
+    runs.into_iter().max_by(|a, b| rough_score(a).total_cmp(&rough_score(b)))?.run(frame, &FINISH)
+}
+
+fn anneal(frame: &Frame, model: Model, state: JointState) -> Option<JointFit> {
+    let tau = FIRST_TAU * state.size();
+    JointFit::start(model, state, tau).run(frame, &ANNEALED)
+}
+
+fn best_score(fits: &[JointFit]) -> f64 {
+    fits.iter().map(rough_score).fold(f64::NEG_INFINITY, f64::max)
+}
+
+fn rough_score(fit: &JointFit) -> f64 {
+    fit.labels.log_likelihood.iter().sum()
+}
+
+/// The model of a state's parts before any is weighed.
+fn default_model(state: &JointState) -> Model {
+    Model::of_parts(state.has_cylinder, state.has_cone).first().copied().unwrap_or(Model::Cylinder)
+}
+
+fn without(state: &JointState, part: Part) -> JointState {
+    let mut rest = state.clone();
+    match part {
+        Part::Cone => {
+            rest.has_cone = false;
+            rest.x[SLOPE..].fill(0.0);
+        }
+        Part::Cylinder => {
+            rest.has_cylinder = false;
+            rest.x[RADIUS..SLOPE].fill(0.0);
+            rest.x[OFFSET..OBLIQUITY + 2].fill(0.0);
+        }
+    }
+    rest
+}
+
+/// Whether no other model can matter: both the wall and what is beside it look as one vessel's do.
+fn is_certain(frame: &Frame, fit: &JointFit, weighed: &[Weighed]) -> bool {
+    let sure = weighed.first().is_some_and(|w| w.probability > CERTAIN);
+    let size = fit.state.size();
+    let plain = fit.tau.iter().all(|tau| *tau < PLAIN_TAU.min(1e-3 * size).max(3e-4))
+        && fit.correlation.iter().all(|f| *f < PLAIN_CORRELATION)
+        && fit.amplitudes.at_cap(size).is_none();
+    sure && plain && fit.state.has_cylinder && !is_cylinder_weak(fit) && steep_unexplained(frame, fit) < PLAIN_STEEP
+}
+
+/// Number of tiles that were held against the wall.
+pub fn tiles_met(fit: &JointFit) -> f64 {
+    fit.sights.iter().flatten().count() as f64
+}
+
+/// Numbers of wall tiles on cylinder and cone.
+pub fn wall_tiles(fit: &JointFit) -> [f64; 2] {
+    let mut count = [0.0; 2];
+    for (sight, p) in fit.sights.iter().zip(&fit.labels.wall) {
+        if let Some(sight) = sight {
+            count[usize::from(sight.at.part == Part::Cone)] += p;
+        }
+    }
+    count
+}
+
+/// Whether so little of the cylinder is seen that the cone may be all there is.
+fn is_cylinder_weak(fit: &JointFit) -> bool {
+    wall_tiles(fit)[0] < LEAST_CYLINDER * tiles_met(fit) || cylinder_arc(fit) < LEAST_ARC
+}
+
+/// Arc of the cylinder's wall tiles, as a fraction of the circle: 36 sectors with three tiles each, or one of a sketch.
+pub fn cylinder_arc(fit: &JointFit) -> f64 {
+    let mut sectors = [0u32; 36];
+    for (sight, p) in fit.sights.iter().zip(&fit.labels.wall) {
+        if let Some(sight) = sight.filter(|s| s.at.part == Part::Cylinder && *p > 0.5) {
+            let turn = sight.at.radial[1].atan2(sight.at.radial[0]) / std::f64::consts::TAU + 0.5;
+            sectors[((turn * 36.0) as usize).min(35)] += 1;
+        }
+    }
+    let enough = if tiles_met(fit) > 0.5 * fit.sights.len() as f64 { 3 } else { 1 };
+    sectors.iter().filter(|n| **n >= enough).count() as f64 / 36.0
+}
+
+/// Smooth tiles before the wall that are too steep for feed and no deposit, over the wall's tiles.
+fn steep_unexplained(frame: &Frame, fit: &JointFit) -> f64 {
+    let axis = fit.state.pose().axis_direction();
+    let patches = frame.readings.patches;
+    let steep = patches.list.iter().enumerate().filter(|(i, p)| {
+        let wall = fit.labels.wall.get(*i).is_some_and(|w| *w > 0.5) || fit.labels.deposit.get(*i).is_some_and(|d| *d);
+        let seam = patches.neighbours[*i].iter().any(|&n| fit.labels.wall.get(n as usize).is_some_and(|w| *w > 0.5));
+        p.smooth && !wall && !seam && p.normal.dot(&axis).abs() < STEEP_COSINE
+    });
+    let [cylinder, cone] = wall_tiles(fit);
+    steep.count() as f64 / (cylinder + cone).max(1.0)
+}

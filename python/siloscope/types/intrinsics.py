@@ -1,0 +1,61 @@
+"""How exactly a camera's intrinsics are known."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+from siloscope.errors import UsageError
+from siloscope.types.camera import Camera
+
+
+@dataclass(frozen=True)
+class IntrinsicsStd:
+    """Standard deviations of a camera's intrinsics.
+
+    No frame shows an error of the principal point or of both focal lengths: what is stated here goes into the answer.
+    """
+
+    f: float
+    """Of the focal lengths, as a fraction of them."""
+    c: float
+    """Of the principal point, pixels."""
+    k1: float
+    """Of the first radial distortion coefficient."""
+
+    def of_rays(self, camera: Camera) -> tuple[float, float, float, float, float]:
+        """Of fx and fy (relative), of cx and cy in units of the rays, and of k1."""
+        return self.f, self.f, self.c / camera.fx, self.c / camera.fy, self.k1
+
+    def to_dict(self) -> dict[str, float]:
+        """Plain data, as in a camera file's ``intrinsics_std``."""
+        return asdict(self)
+
+
+EXACT = IntrinsicsStd(0.0, 0.0, 0.0)
+"""As in a simulation."""
+
+CALIBRATED = IntrinsicsStd(0.002, 1.0, 0.003)
+"""A camera's own intrinsics, from its factory or a calibration board: 0.2 % and a pixel, by reprojection."""
+
+NOMINAL_F, NOMINAL_C, NOMINAL_K1 = 0.02, 0.01, 0.03
+"""What specimens of a model scatter by: 2 %, 1 % of the image's width, and 0.03."""
+
+NAMES = ("exact", "calibrated", "nominal")
+
+
+def named(name: str, camera: Camera) -> IntrinsicsStd:
+    """The standard deviations of a name: exact, calibrated or nominal.
+
+    Raises
+    ------
+    UsageError
+        For another name.
+    """
+    known = {
+        "exact": EXACT,
+        "calibrated": CALIBRATED,
+        "nominal": IntrinsicsStd(NOMINAL_F, NOMINAL_C * camera.width, NOMINAL_K1),
+    }
+    if name not in known:
+        raise UsageError(f"unknown intrinsics '{name}'; known are {', '.join(NAMES)}")
+    return known[name]
