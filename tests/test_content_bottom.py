@@ -14,6 +14,7 @@ import vessels
 from silos import STOUT, known, measured, noisy, scene
 from siloscope.content import products
 from siloscope.simulation import Feed, Silo
+from siloscope.types.calibration import FrameRecord
 from siloscope.types.floor import Floor
 from siloscope.vessel.datasheet import Datasheet
 from siloscope.vessel.floor import floor_of
@@ -21,9 +22,11 @@ from siloscope.vessel.floor import floor_of
 STEEP = Silo(radius=1.0, cylinder_height=2.0, cone_height=1.5)
 
 
-def untold(made: Any, std: float = 0.0) -> siloscope.Calibration:
-    """A calibration that was told nothing of its cone."""
-    return replace(known(made, std), floor=Floor())
+def untold(made: Any, std: float = 0.0, reach: tuple[float, float] = (0.05, 0.98)) -> siloscope.Calibration:
+    """A calibration that was told nothing of its cone, and saw it bare between two fractions of its radius."""
+    radius = made.silo.radius
+    seen = FrameRecord(0, "frame", "used", 1.0, cone_reach=(reach[0] * radius, reach[1] * radius))
+    return replace(known(made, std), floor=Floor(), frames=(seen,))
 
 
 class TestRule:
@@ -36,6 +39,17 @@ class TestRule:
         assert floor.kind == kind
         assert floor.seen is not None
         assert floor.seen.angle == pytest.approx(math.atan(cone))
+
+    @pytest.mark.parametrize("reach", [(0.6, 0.98), (0.05, 0.5)])
+    def test_a_steep_surface_proves_itself_only_where_it_was_seen(self, reach: tuple[float, float]) -> None:
+        """Below it another stage may follow, above it a flatter one may come before."""
+        made = scene(None, silo=STEEP)
+        assert floor_of(untold(made, 1e-3), Datasheet())[0].hidden_std > 0.0
+        assert floor_of(untold(made, 1e-3, reach), Datasheet())[0].kind == "unknown"
+        assert floor_of(replace(untold(made, 1e-3), frames=()), Datasheet())[0].kind == "unknown"
+        content = siloscope.measure(made.render().frame(), untold(made, 1e-3, reach))
+        assert content.volume is None
+        assert "--bottom cone" in (content.message or "")
 
     def test_a_vague_slope_is_no_proof(self) -> None:
         made = scene(None, silo=replace(STEEP, cone_height=1.25))

@@ -63,7 +63,7 @@ def content_of(
     free = ullage_of(core, known, silo)
     over = _over(core, ContentSetup(known, silo), free)
     capacity, capacity_from = _capacity(request, silo, lacking, over)
-    found = _with_total(Measured.of(core), over, free if lacking else None)
+    found = _with_hidden(_with_total(Measured.of(core), over, free if lacking else None), known)
     coverage = _coverage(core)
     said = (*known.remarks, *quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
     frame: dict[str, Any] = {
@@ -118,6 +118,15 @@ def _beyond_range(known: Knowledge, against: Remark | None) -> Remark | None:
     if against is None or against.code != "too-little-seen" or deepest is None or deepest <= far:
         return against
     return Remark("beyond-range", f"the floor lies at {deepest:.1f} m, the sensor measures up to {far:g} m", True)
+
+
+def _with_hidden(found: Measured, known: Knowledge) -> Measured:
+    """The core's answer with what the unseen part of the bottom adds to the deviation."""
+    hidden = known.floor.hidden_std
+    if hidden == 0.0:
+        return found
+    parts = replace(found.parts, geometry=math.hypot(found.parts.geometry, hidden))
+    return replace(found, parts=parts, total=math.hypot(found.total, hidden))
 
 
 def _unknown_bottom(known: Knowledge, lacking: tuple[str, ...]) -> Remark:

@@ -53,7 +53,7 @@ def _record(number: int, answer: LocatedFrame) -> FrameRecord:
         return replace(plain, status="unreadable", reason=str(answer.error))
     if not answer.estimate.ok:
         return replace(plain, status="refused", reason=answer.estimate.reason)
-    return replace(plain, pose=answer.estimate.pose)
+    return replace(plain, pose=answer.estimate.pose, cone_reach=answer.cone_reach or answer.estimate.cone_reach)
 
 
 def since_the_last_move(history: History) -> tuple[History, FrameFactors, Fused]:

@@ -18,5 +18,7 @@ class LocatedFrame:
     estimate: Estimate | None
     error: InputError | None = None
     camera: Camera | None = None
+    cone_reach: tuple[float, float] | None = None
+    """Distances from the axis between which it shows the bare cone, m; None where the estimate itself tells."""
     made: bool = True
     """Whether it was made here; False for an estimate that the caller brought."""

@@ -52,7 +52,8 @@ class FrameLocator:
         except InputError as error:
             return LocatedFrame(name, timestamp, None, error), None
         camera = self.camera or (frame.camera if isinstance(frame, Frame) else None)
-        return LocatedFrame(name, timestamp, replace(estimate, details=None), camera=camera), estimate
+        bare = replace(estimate, details=None)
+        return LocatedFrame(name, timestamp, bare, camera=camera, cone_reach=estimate.cone_reach), estimate
 
     def _estimate(self, number: int, frame: Any, start: Estimate | None) -> Estimate:
         common, unit = self.settings, self.depth_unit

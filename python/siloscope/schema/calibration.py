@@ -76,6 +76,14 @@ def _diameter(value: float) -> float:
     return value
 
 
+def _reach(value: Any) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    if not isinstance(value, list) or len(value) != 2:
+        raise wrong("must be 2 numbers")
+    return finite(value[0]), finite(value[1])
+
+
 class Pose(Document):
     """Of a record or the whole; all four or none."""
 
@@ -159,6 +167,7 @@ class Record(Pose):
     deviation: Number | None = None
     timestamp: Number | None = None
     reason: str | None = None
+    cone_reach: Annotated[tuple[float, float] | None, PlainValidator(_reach)] = None
 
     @model_validator(mode="after")
     def _whole(self) -> Record:

@@ -44,6 +44,8 @@ class FrameRecord:
     timestamp: float | None = None
     reason: str | None = None
     """Why it has no answer."""
+    cone_reach: tuple[float, float] | None = None
+    """Distances from the axis between which it shows the bare cone, m."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -57,6 +59,7 @@ class FrameRecord:
             **{name: None if pose is None else getattr(pose, name) for name in ("r_x", "r_y", "t_x", "t_y")},
             "timestamp": self.timestamp,
             "reason": self.reason,
+            "cone_reach": None if self.cone_reach is None else list(self.cone_reach),
         }
 
 
@@ -149,6 +152,12 @@ class Calibration(ByValue):
     def moved_at(self) -> Move | None:
         """The last move of the camera, or None."""
         return self.moves[-1] if self.moves else None
+
+    @property
+    def cone_reach(self) -> tuple[float, float] | None:
+        """Distances from the axis between which the fused frames show the bare cone, m; None where none does."""
+        seen = [r.cone_reach for r in self.frames if r.cone_reach is not None and r.status in ("used", "not-averaged")]
+        return (min(near for near, _ in seen), max(far for _, far in seen)) if seen else None
 
     @property
     def counts(self) -> dict[str, int]:
@@ -254,7 +263,7 @@ def _floor(told: FloorDocument) -> Floor:
     seen = told.seen_cone
     cone = None if seen is None else SeenCone(seen.angle_rad, seen.std_rad)
     seen_map = None if told.map is None else FloorMap(**_fields(FloorMap, told.map))
-    return Floor(told.kind, told.evidence, cone, seen_map)
+    return Floor(told.kind, told.evidence, cone, map=seen_map)
 
 
 def _record(told: Record) -> FrameRecord:

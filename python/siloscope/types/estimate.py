@@ -81,6 +81,10 @@ class SurfaceDetails(ByValue):
         return None if self.pixel_labels is None else self.pixel_labels.image
 
 
+FEWEST_CONE_PATCHES = 6
+"""Patches that show how far a cone was seen."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Estimate(ByValue):
     """Pose of the camera in its silo from one frame. Radians and metres.
@@ -111,6 +115,19 @@ class Estimate(ByValue):
     """What the frame says about every parameter, for fusing frames (method ``surface``)."""
     details: SurfaceDetails | None = None
     """Patches, residuals and labels, for pictures (method ``surface``)."""
+
+    @property
+    def cone_reach(self) -> tuple[float, float] | None:
+        """Distances from the axis between which patches show the bare cone, m; None without a cone or its patches."""
+        if self.details is None or self.silo.apex is None:
+            return None
+        joint = -np.inf if self.silo.cylinder_bottom is None else self.silo.cylinder_bottom
+        x, y, z = self.details.points.T
+        across = np.hypot(x, y)[np.isfinite(self.details.residuals) & (z > joint)]
+        if len(across) < FEWEST_CONE_PATCHES:
+            return None
+        near, far = np.quantile(across, (0.02, 0.98))
+        return float(near), float(far)
 
     @property
     def ok(self) -> bool:

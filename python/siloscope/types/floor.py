@@ -88,6 +88,8 @@ class Floor(ByValue):
     """One of `siloscope.reasons.BOTTOM_EVIDENCE`; None for an unknown bottom."""
     seen: SeenCone | None = None
     """The conical surface that was seen, whether it is the bottom or not."""
+    hidden_std: float = 0.0
+    """What the part of the bottom that was never seen adds to a volume's standard deviation, m³."""
     map: FloorMap | None = None
     """Its heights, where it is neither a coaxial cone nor flat."""
 

@@ -20,6 +20,12 @@ STEEPEST_REPOSE = math.radians(50.0)
 PROOF_STD = 2.0
 """Standard deviations by which a surface must be steeper than feed."""
 
+LARGEST_HIDDEN = 0.01
+"""Fraction of the capacity that the unseen part of a cone may hold for the rest to prove a bottom."""
+
+FLATTEST_STAGE = math.tan(math.radians(30.0))
+"""Slope of the flattest stage that a hopper has: feed does not flow off flatter ones."""
+
 CONTRADICTION_STD = 5.0
 """Standard deviations beyond which a datasheet and what is seen contradict each other."""
 
@@ -50,8 +56,29 @@ def floor_of(
     if calibration.floor.known and calibration.floor.evidence != "steep":
         return replace(calibration.floor, seen=seen), ()
     if is_proof(seen, steepest):
-        return Floor("cone", "steep", seen), ()
+        hidden = _hidden(calibration, seen)
+        return (Floor(seen=seen) if hidden is None else Floor("cone", "steep", seen, hidden)), ()
     return Floor(seen=seen), ()
+
+
+def _hidden(calibration: Calibration, seen: SeenCone | None) -> float | None:
+    """Standard deviation of the volume by what was not seen of a steep cone; None where it could matter.
+
+    A cone proves itself only where it was seen bare: towards the axis another stage may follow, towards the wall a
+    flatter one may come before. The largest volumes between are the cone's tip, and the ring down to a slope of feed.
+    """
+    reach, radius = calibration.cone_reach, calibration.silo.radius
+    if reach is None or seen is None:
+        return None
+    (near, far), slope = reach, math.tan(seen.angle)
+    wall = far if radius is None else max(radius, far)
+    tip = math.pi * near**3 * slope / 3.0
+    ring = 2.0 * math.pi * (slope - FLATTEST_STAGE) * ((wall**3 - far**3) / 3.0 - far * (wall**2 - far**2) / 2.0)
+    depth = max(calibration.silo.cylinder_bottom or 0.0, 0.0)
+    whole = math.pi * wall**2 * (depth + wall * slope / 3.0)
+    if max(tip, ring) > LARGEST_HIDDEN * whole:
+        return None
+    return math.hypot(tip, ring) / math.sqrt(3.0)
 
 
 def calibrated_floor(found: Calibration, bottom: str | None, before: Calibration | None) -> Floor:
@@ -113,6 +140,11 @@ def settles(floor: Floor, missing: tuple[str, ...]) -> str:
         options = " and ".join(f"--{name.replace('_', '-')}" for name in missing if name in GIVEN)
         remedy = f"give {options}" if options else "calibrate with frames of a lower level"
         return f"Volume unavailable: of the {floor.kind} bottom the {lacking} is not known; {remedy}."
+    if floor.seen is not None and floor.seen.angle > STEEPEST_REPOSE:
+        return (
+            f"Volume unavailable: only a part of the steep surface ({floor.seen}) was seen bare, another stage may "
+            "follow; say --bottom cone if it is one cone, or calibrate with a frame of the empty vessel (--empty)."
+        )
     if floor.seen is None:
         return (
             "Volume unavailable: the bottom was never seen; calibrate with a frame of the empty vessel (--empty FRAME)."
