@@ -13,6 +13,7 @@ pub mod likelihood;
 mod misfit;
 pub mod model_selection;
 pub mod normal_equations;
+pub mod outcome;
 pub mod outermost;
 pub mod parts;
 pub mod polish;
@@ -32,10 +33,10 @@ use crate::Vec3;
 use crate::base::clock::Clock;
 use crate::base::refusal::Refusal;
 use crate::base::workers::Workers;
-use crate::fusion::frame_factor::{FrameFactor, restrict};
+use crate::fusion::frame_factor::restrict;
 use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
-use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
+use crate::geometry::parameters::{Information, OVALITY};
 use crate::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
 use crate::geometry::surface::SurfaceTolerance;
 use crate::surface_fit::bow::bow_uncertainty;
@@ -47,68 +48,16 @@ use crate::surface_fit::covariance::{
 use crate::surface_fit::diagnostics::WallEvidence;
 use crate::surface_fit::factor::{frame_factor, some_rays};
 use crate::surface_fit::grain::relief_with_grain;
-use crate::surface_fit::joint::{JointSummary, fit_inside};
+use crate::surface_fit::joint::fit_inside;
 use crate::surface_fit::likelihood::may_be_feed;
 use crate::surface_fit::model_selection::{Settled, coarse_fit, drop_film};
+use crate::surface_fit::outcome::check_determined;
+pub use crate::surface_fit::outcome::{Knowledge, Outcome, SurfaceFit, Vessels};
 use crate::surface_fit::parts::change_without_a_part;
 use crate::surface_fit::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
 use crate::surface_fit::solver::{Fit, OVALITY_STD, Prior, Problem, free_parameters, tukey};
 use crate::surface_fit::tiles::{Patch, Patches, noise_from_scatter, tile_patches};
 use crate::surface_fit::warm_start::{KnownWall, confirmed};
-
-/// What the caller knows.
-#[derive(Debug, Clone)]
-pub struct Knowledge {
-    /// The sensor's depth error.
-    pub error: DepthError,
-    /// Radius of the cylinder and its standard deviation, metres.
-    pub radius: Option<(f64, f64)>,
-    /// Direction of gravity in the camera frame and its standard deviation, radians.
-    pub gravity: Option<(Vec3, f64)>,
-    /// Which vessels may be in view.
-    pub vessels: Vessels,
-}
-
-/// Which vessels an image may show.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Vessels {
-    /// A cylinder on a coaxial cone, seen through exact intrinsics: the model in which frames are fused.
-    Coaxial,
-    /// Those of the joint fit, which compete.
-    Any {
-        /// Standard deviations of the intrinsics: focal lengths (relative), principal point (rays), k1; 0 where exact.
-        camera_std: [f64; 5],
-    },
-}
-
-/// Result of the fit, before it is judged.
-#[derive(Debug, Clone)]
-pub struct SurfaceFit {
-    /// State: surface, bias, misfit.
-    pub fit: Fit,
-    /// Covariance over all parameters; zero rows for those that are not free.
-    pub covariance: Information,
-    /// What this frame alone says, without priors (for fusing frames).
-    pub share: FrameFactor,
-    /// Which parameters are estimated.
-    pub free: [bool; PARAMETERS],
-    /// Noise law used.
-    pub noise: NoiseLaw,
-    /// Residual scatter over expectation (reduced chi-square) of the tiles.
-    pub chi_square: f64,
-    /// What the wall looks like.
-    pub evidence: WallEvidence,
-    /// The wall as patches show it, for other frames of the same camera.
-    pub wall: KnownWall,
-    /// The patches.
-    pub patches: Patches,
-    /// Final residual of each wall patch across the wall, metres; NaN elsewhere.
-    pub residuals: Vec<f64>,
-    /// Milliseconds of each stage, in order.
-    pub timing: Vec<(&'static str, f64)>,
-    /// What the joint fit says beside the wall; `None` where the vessel is a coaxial one, for clouds and views from outside.
-    pub joint: Option<Box<JointSummary>>,
-}
 
 /// How far a wall that shows ovality, and so is no ideal one, lies off its mean over a block of tiles, metres.
 const WALL_FORM: f64 = 2.5e-4;
@@ -263,11 +212,6 @@ fn on_pixels(
     (problem.noise, pixel_equations(&problem, image, fit, wall, &ALL))
 }
 
-/// Largest standard deviation of the axis' direction that still is an answer, radians.
-pub(crate) const MAX_DIRECTION_STD: f64 = 0.02;
-/// Largest standard deviation of the axis' position that still is an answer, as a share of the radius.
-pub(crate) const MAX_POSITION_STD: f64 = 0.05;
-
 impl SurfaceFit {
     /// Centres of the patches in the silo frame, freed from the depth bias: what the r–z profile shows.
     pub fn patch_points(&self) -> Vec<Vec3> {
@@ -293,9 +237,6 @@ impl SurfaceFit {
         votes > 0
     }
 }
-
-/// A fit, or why there is none.
-pub type Outcome = std::result::Result<SurfaceFit, Refusal>;
 
 /// Fits the wall to a cloud of points in the camera's frame, thinned by a voxel grid with cells of `grid` metres.
 ///
@@ -346,24 +287,6 @@ fn prior(know: &Knowledge) -> Prior {
         bias_std[1] = bias_std[1].max(0.05); // a known radius fixes the scale better than any expectation
     }
     Prior { bias: know.error.bias, bias_std, radius: know.radius, gravity: know.gravity, ovality_std: 0.0 }
-}
-
-/// Whether the axis is known well enough: its direction, and its position in the middle of the wall that was seen.
-pub(crate) fn check_determined(
-    covariance: &Information,
-    placed: &SurfaceEvaluator,
-    height: f64,
-) -> std::result::Result<(), Refusal> {
-    let [x, y] = placed.axis_shift(height);
-    let variance = |row: &Parameters| row.dot(&(covariance * row));
-    let direction = (covariance[(0, 0)] + covariance[(1, 1)]).sqrt();
-    let position = (variance(&x) + variance(&y)).sqrt();
-    match (direction < MAX_DIRECTION_STD, position < MAX_POSITION_STD * placed.surface.size()) {
-        (true, true) => Ok(()),
-        (true, false) => Err(Refusal::PositionUnknown),
-        (false, true) => Err(Refusal::DirectionUnknown),
-        (false, false) => Err(Refusal::PoorlyDetermined),
-    }
 }
 
 /// Last solution, covariance and residuals.

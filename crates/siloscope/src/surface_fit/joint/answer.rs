@@ -6,13 +6,13 @@ use crate::fusion::frame_factor::FrameFactor;
 use crate::geometry::convex_vessel::ConvexVessel;
 use crate::geometry::parameters::{Information, PARAMETERS, Parameters};
 use crate::geometry::surface::{Cone, Part, SiloSurface};
-use crate::surface_fit::joint::HOPPER_SLOPE;
 use crate::surface_fit::joint::form::{GROUPS, Group};
-use crate::surface_fit::joint::model::{Amplitudes, Model, prior};
+use crate::surface_fit::joint::frame::Frame;
+use crate::surface_fit::joint::model::{Amplitudes, HOPPER_SLOPE, Model, prior};
 use crate::surface_fit::joint::parameters::{BIAS, CAMERA, INTERCEPT, RADIUS, SIZE, SLOPE};
 use crate::surface_fit::joint::search::{LEAST_ARC, OVAL_COLUMN, Search, cylinder_arc, tiles_met, wall_tiles};
 use crate::surface_fit::joint::select::{Average, averaged};
-use crate::surface_fit::joint::solve::{Frame, JointFit};
+use crate::surface_fit::joint::solve::JointFit;
 use crate::surface_fit::joint::system::Prior;
 use nalgebra::{DMatrix, SMatrix};
 

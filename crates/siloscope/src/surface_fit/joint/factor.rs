@@ -1,9 +1,10 @@
 //! What one frame alone says, for other frames of the same silo and camera.
 
+use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::model::Model;
 use crate::surface_fit::joint::parameters::{JointState, SIZE};
 use crate::surface_fit::joint::select::Weighed;
-use crate::surface_fit::joint::solve::{Frame, JointFit};
+use crate::surface_fit::joint::solve::JointFit;
 use nalgebra::{DMatrix, DVector};
 
 /// A frame's negative log-likelihood ½ δᵀ H δ + gᵀ δ about a state, over pose, geometry, form, intrinsics and bias.

@@ -9,6 +9,7 @@ pub mod answer;
 pub mod correlation;
 pub mod factor;
 pub mod form;
+pub mod frame;
 pub mod labels;
 pub mod model;
 pub mod parameters;
@@ -18,6 +19,7 @@ pub mod readings;
 pub mod search;
 pub mod select;
 pub mod solve;
+pub mod summary;
 pub mod system;
 
 use crate::SiloPose;
@@ -31,23 +33,23 @@ use crate::surface_fit::diagnostics::{WallEvidence, wall_evidence};
 use crate::surface_fit::joint::answer::{JointAnswer, answer, is_ambiguous, judge};
 use crate::surface_fit::joint::factor::JointFactor;
 use crate::surface_fit::joint::form::Form;
-use crate::surface_fit::joint::model::{Inputs, Model};
+use crate::surface_fit::joint::frame::Frame;
+use crate::surface_fit::joint::model::{HOPPER_SLOPE, Inputs, Model};
 use crate::surface_fit::joint::parameters::{INTERCEPT, SLOPE};
 use crate::surface_fit::joint::readings::Readings;
 use crate::surface_fit::joint::search::{Search, search};
-use crate::surface_fit::joint::solve::{Frame, JointFit};
+use crate::surface_fit::joint::solve::JointFit;
+use crate::surface_fit::joint::summary::JointSummary;
 use crate::surface_fit::model_selection::{self, Settled};
+use crate::surface_fit::outcome::{
+    Knowledge, MAX_DIRECTION_STD, MAX_POSITION_STD, Outcome, SurfaceFit, Vessels, check_determined,
+};
 use crate::surface_fit::proposals::other_part;
 use crate::surface_fit::solver::{Fit, Problem};
 use crate::surface_fit::tiles::{NONE, Patches};
 use crate::surface_fit::vertex::is_covered;
 use crate::surface_fit::warm_start::KnownWall;
-use crate::surface_fit::{
-    Knowledge, MAX_DIRECTION_STD, MAX_POSITION_STD, Outcome, SurfaceFit, Vessels, check_determined,
-};
 
-/// A cone less steep than this needs feed that lies in it to be a hopper's: 48°, above all drained angles of repose.
-pub(crate) const HOPPER_SLOPE: f64 = 0.90;
 /// Near enough to a wall found on tiles for what was measured there to hold.
 const SAME: SurfaceTolerance = SurfaceTolerance { tilt: 0.003, shift: 0.01, radius: 0.01, slope: 0.1, apex: 0.1 };
 /// Model error of a cone beyond its cylinder's that is a surface of feed, metres.
@@ -194,21 +196,4 @@ fn surface_fit(
             factor,
         })),
     }
-}
-
-/// What the joint fit says beside the wall.
-#[derive(Debug, Clone)]
-pub struct JointSummary {
-    /// The answer with its models.
-    pub answer: JointAnswer,
-    /// What the frame alone says.
-    pub factor: JointFactor,
-    /// Model error of cylinder and cone, metres across the wall.
-    pub tau: [f64; 2],
-    /// Correlation factors of cylinder and cone.
-    pub correlation: [f64; 2],
-    /// Learned amplitudes of the form, metres.
-    pub amplitudes: [f64; 5],
-    /// Factor by which the intrinsics are off more than stated.
-    pub camera_factor: f64,
 }

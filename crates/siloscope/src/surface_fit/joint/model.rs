@@ -8,6 +8,9 @@ use crate::surface_fit::joint::parameters::{
 };
 use crate::surface_fit::joint::system::Prior;
 
+/// A cone less steep than this needs feed that lies in it to be a hopper's: 48°, above all drained angles of repose.
+pub(crate) const HOPPER_SLOPE: f64 = 0.90;
+
 /// A model of the vessel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Model {

@@ -1,9 +1,9 @@
 //! The last linearisation: residuals of the pixels, not of the tiles' planes.
 
 use crate::geometry::surface::Part;
+use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::labels::Labels;
 use crate::surface_fit::joint::predict::{Predictor, Sight};
-use crate::surface_fit::joint::solve::Frame;
 use crate::surface_fit::residual::{Sampling, tile_residual_against};
 
 /// Tiles less likely to be wall keep their own mean.

@@ -1,12 +1,13 @@
 //! Which fits are run: from the tile stage's answer where that is certain, else from every proposal anew.
 
 use crate::geometry::surface::{Part, SiloSurface, SurfaceTolerance};
+use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::model::Model;
 use crate::surface_fit::joint::parameters::{
     BIAS, CYLINDER_FORM, INTERCEPT, JointState, OBLIQUITY, OFFSET, RADIUS, SIZE, SLOPE,
 };
 use crate::surface_fit::joint::select::{Weighed, weigh};
-use crate::surface_fit::joint::solve::{Frame, JointFit, Schedule};
+use crate::surface_fit::joint::solve::{JointFit, Schedule};
 use crate::surface_fit::solver::Fit;
 
 /// From a wall that is known to a millimetre.

@@ -1,9 +1,10 @@
 //! Models weighed against each other by Laplace evidence, and the answer averaged over them.
 
 use crate::geometry::surface::Part;
+use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::model::{Model, prior};
 use crate::surface_fit::joint::parameters::{CAMERA, SIZE};
-use crate::surface_fit::joint::solve::{Frame, JointFit};
+use crate::surface_fit::joint::solve::JointFit;
 use crate::surface_fit::joint::system::Posterior;
 use nalgebra::{DMatrix, DVector};
 

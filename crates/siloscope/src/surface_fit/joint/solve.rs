@@ -1,11 +1,10 @@
 //! The joint fit of one model: relinearise, label, solve, and learn the widths, until it stands.
 
-use crate::geometry::depth_image::DepthImage;
 use crate::geometry::surface::Part;
 use crate::surface_fit::joint::correlation::correlation_factor;
-use crate::surface_fit::joint::form::Form;
+use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::labels::{LabelModel, Labels, label};
-use crate::surface_fit::joint::model::{Amplitudes, Inputs, Model, prior};
+use crate::surface_fit::joint::model::{Amplitudes, Model, prior};
 use crate::surface_fit::joint::parameters::{COMMON, CYLINDER_END, INTERCEPT, JointState, RADIUS, SIZE, SLOPE};
 use crate::surface_fit::joint::pixels::pixel_means;
 use crate::surface_fit::joint::predict::{Predictor, Sight, own_columns};
@@ -54,19 +53,6 @@ pub struct Schedule {
     pub sketched: usize,
     /// Last steps on all tiles and the pixels where tiles are uneven.
     pub pixels: usize,
-}
-
-/// What stays the same during fits of a frame.
-#[derive(Debug, Clone, Copy)]
-pub struct Frame<'a> {
-    /// The tiles.
-    pub readings: &'a Readings<'a>,
-    /// The pixels.
-    pub image: &'a DepthImage<'a>,
-    /// The form's terms.
-    pub form: &'a Form,
-    /// What is known before.
-    pub inputs: &'a Inputs,
 }
 
 /// Rows of the tiles that may be wall, at a linearisation point.
