@@ -11,6 +11,7 @@ import pytest
 from siloscope import Camera, UsageError, _core
 from siloscope.simulation import ASTRA, ASTRA_S, Defects, Feed, Scene, SensorModel, SimulatedFrame, true_camera
 from siloscope.simulation.scenarios import SILO1, SILO2
+from siloscope.simulation.scene import FlatPixels
 
 CAMERA = Camera(width=320, height=240, fx=285.0, fy=285.0, cx=159.5, cy=119.5)
 SCENE = replace(SILO2, camera=CAMERA, feed=Feed("funnel", 0.3))
@@ -159,14 +160,14 @@ def test_a_bent_lens_changes_the_rays_and_nothing_else(device: str) -> None:
 def test_the_binding_takes_any_layout_and_refuses_arrays_that_do_not_belong_together() -> None:
     frame = replace(SCENE, sensor=ASTRA_S, seed=1).render()
     depth, labels, normals = frame.depth.ravel(), frame.labels.ravel(), frame.normals.reshape(-1, 3)
-    strided = (np.repeat(depth, 2)[::2], np.repeat(labels, 2)[::2], np.asfortranarray(normals))
-    again, _ = _core.measure_depth(ASTRA_S, CAMERA, *strided, 1, 1)
-    assert np.array_equal(again, frame.measured.ravel())
-    blank, _ = _core.measure_depth(ASTRA_S, CAMERA, depth * np.nan, labels, normals * np.nan, 1, 1)
-    assert not blank.any()
+    strided = FlatPixels(np.repeat(depth, 2)[::2], np.repeat(labels, 2)[::2], np.asfortranarray(normals))
+    again = _core.measure_depth(ASTRA_S, CAMERA, strided, 1, 1)
+    assert np.array_equal(again.depth, frame.measured.ravel())
+    blank = _core.measure_depth(ASTRA_S, CAMERA, FlatPixels(depth * np.nan, labels, normals * np.nan), 1, 1)
+    assert not blank.depth.any()
     for parts in [(depth[:-1], labels, normals), (depth[:0], labels, normals[:0]), (depth, labels, normals[:, :2])]:
         with pytest.raises(ValueError, match=r"normals|depth"):
-            _core.measure_depth(ASTRA_S, CAMERA, *parts, 1, 1)
+            _core.measure_depth(ASTRA_S, CAMERA, FlatPixels(*parts), 1, 1)
 
 
 def test_light_that_goes_round_lengthens_what_lies_in_a_hollow() -> None:

@@ -18,12 +18,9 @@ import siloscope
 from silos import known, measured, scene
 from siloscope import Calibration, Camera, Content, Estimate, Frame, _core
 from siloscope.content import surface_map
-from siloscope.estimation.inputs import metres
-from siloscope.estimation.priors import Priors
 from siloscope.simulation import ASTRA_S, Feed
 from siloscope.simulation.scenarios import random_scene
 from siloscope.types.by_value import ByValue, same
-from siloscope.types.depth_frame import DepthFrame
 from siloscope.types.track import Track
 
 HALF = Camera(width=320, height=240, fx=285.15, fy=285.15, cx=159.5, cy=119.5)
@@ -240,61 +237,3 @@ def test_a_repr_fits_on_one_screen() -> None:
         assert lines[0].startswith(type(one).__name__)
     assert "status='refused'" in repr(estimates()[-4])
     assert f"r_x={estimates()[0].r_x}"[:10] in repr(estimates()[0])
-
-
-def layouts(array: np.ndarray[Any, Any]) -> list[np.ndarray[Any, Any]]:
-    """The same array laid out otherwise: by columns, with gaps, backwards."""
-    gaps = np.repeat(np.repeat(array, 2, axis=0), 2, axis=1)[::2, ::2]
-    return [np.asfortranarray(array), gaps, np.ascontiguousarray(array[::-1, ::-1])[::-1, ::-1]]
-
-
-def test_arrays_of_any_layout_are_read_right() -> None:
-    depth = metres(frame(304))
-    priors = Priors(siloscope.sensors.load("orbbec-astra-s"))
-    frames = [
-        DepthFrame(d, HALF, r)
-        for d, r in zip([depth, *layouts(depth)], [HALF.rays(), *layouts(HALF.rays())], strict=True)
-    ]
-    found = [_core.fit_depth(f, priors) for f in frames]
-    for one, f in zip(found, frames, strict=True):
-        assert isinstance(one, _core.SurfaceFit)
-        assert isinstance(found[0], _core.SurfaceFit)
-        np.testing.assert_array_equal(one.parameters, found[0].parameters)
-        np.testing.assert_array_equal(one.labels(f), found[0].labels(frames[0]))
-    points = cloud(304)
-    for layout in [np.asfortranarray(points), np.repeat(points, 2, axis=0)[::2]]:
-        one, other = (_core.fit_points(p, priors, 0.05) for p in (points, layout))
-        assert isinstance(one, _core.SurfaceFit)
-        assert isinstance(other, _core.SurfaceFit)
-        np.testing.assert_array_equal(one.parameters, other.parameters)
-
-
-def test_arrays_without_measurements_are_refused_and_wrong_ones_named() -> None:
-    priors = Priors(siloscope.sensors.load(None))
-    for empty in (np.zeros((240, 320), np.float32), np.full((240, 320), np.nan, np.float32)):
-        found = _core.fit_depth(DepthFrame(empty, HALF, HALF.rays()), priors)
-        assert isinstance(found, _core.Refusal)
-        assert found.slug == "no-depth"
-        assert found in _core.refusals()
-    for nothing in (np.zeros((0, 3)), np.full((100, 3), np.nan)):
-        assert isinstance(_core.fit_points(nothing, priors, 0.05), _core.Refusal)
-    with pytest.raises(ValueError, match=r"\(N, 3\)"):
-        _core.fit_points(np.zeros((3, 4)), priors, 0.05)
-    with pytest.raises(ValueError, match="camera"):
-        _core.fit_depth(DepthFrame(np.zeros((320, 240), np.float32), HALF, HALF.rays()), priors)
-    with pytest.raises(ValueError, match="rays"):
-        _core.fit_depth(DepthFrame(np.zeros((240, 320), np.float32), HALF, np.zeros((320, 240, 2))), priors)
-    with pytest.raises(ValueError, match="float32"):
-        _core.fit_depth(DepthFrame(np.zeros((240, 320)), HALF, HALF.rays()), priors)
-    unaligned = np.frombuffer(b"\0" * (240 * 320 * 4 + 1), np.uint8)[1:].view(np.float32).reshape(240, 320)
-    with pytest.raises(ValueError, match="aligned"):
-        _core.fit_depth(DepthFrame(unaligned, HALF, HALF.rays()), priors)
-
-
-def test_a_lens_that_distorts_needs_its_rays() -> None:
-    bent = replace(HALF, distortion_model="brown_conrady", distortion=(0.05,))
-    depth = np.ones((240, 320), np.float32)
-    with pytest.raises(ValueError, match="rays"):
-        _core.back_project(DepthFrame(depth, bent))
-    points = _core.back_project(DepthFrame.of(depth, bent))
-    np.testing.assert_array_equal(points[:, :2], bent.rays().reshape(-1, 2))

@@ -2,16 +2,19 @@
 
 use crate::convert::value_error;
 use numpy::ndarray::Dimension;
-use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2, PyUntypedArrayMethods};
+use numpy::{
+    Element, PyArray, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray, PyReadonlyArray2, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 use siloscope::Vec3;
 use siloscope::geometry::parameters::{Information, PARAMETERS};
 use std::borrow::Cow;
 
-/// Entries of an array row by row: borrowed where they lie so, copied from strided and Fortran-ordered arrays.
+/// Entries of an array row by row: borrowed where they lie so, copied from strided, Fortran-ordered and unaligned arrays.
 pub fn in_c_order<'a, T: Element + Copy, D: Dimension>(array: &'a PyReadonlyArray<'_, T, D>) -> PyResult<Cow<'a, [T]>> {
     if !array.is_empty() && !array.is_aligned() {
-        return Err(value_error("the array is not aligned in memory; give a copy of it"));
+        let copy = array.as_any().call_method0("copy")?; // by rows, and aligned
+        return Ok(Cow::Owned(copy.cast::<PyArray<T, D>>()?.to_vec()?));
     }
     match array.as_slice() {
         Ok(entries) if array.is_c_contiguous() => Ok(Cow::Borrowed(entries)),

@@ -1,5 +1,6 @@
 //! Depth arrays of any type as float32 metres.
 
+use crate::arrays::in_c_order;
 use crate::convert::value_error;
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
@@ -7,14 +8,18 @@ use pyo3::prelude::*;
 /// Raw 16-bit depth that means "no measurement".
 const SENTINEL: u16 = u16::MAX;
 
-/// Depth (H, W) of uint16, float32 or float64 times `unit` as float32 metres, C-contiguous, 0 where there is no
-/// measurement; and whether any pixel has one.
+/// A depth image in metres.
+#[pyclass(frozen, get_all, module = "siloscope._core")]
+struct MetricDepth {
+    /// (H, W) float32 metres, C-contiguous, 0 where there is no measurement.
+    depth: Py<PyArray2<f32>>,
+    /// Whether any pixel has a measurement.
+    any_measured: bool,
+}
+
+/// Depth (H, W) of uint16, float32 or float64 times `unit` as float32 metres.
 #[pyfunction]
-fn depth_metres<'py>(
-    py: Python<'py>,
-    depth: &Bound<'py, PyAny>,
-    unit: f64,
-) -> PyResult<(Bound<'py, PyArray2<f32>>, bool)> {
+fn depth_metres<'py>(py: Python<'py>, depth: &Bound<'py, PyAny>, unit: f64) -> PyResult<MetricDepth> {
     let unit = unit as f32;
     if let Ok(raw) = depth.extract::<PyReadonlyArray2<'py, u16>>() {
         return converted(py, &raw, |&z| if z == SENTINEL { 0.0 } else { f32::from(z) * unit });
@@ -27,21 +32,19 @@ fn depth_metres<'py>(
     converted(py, &double, |&z| known(z as f32))
 }
 
-fn converted<'py, T: Element + Sync>(
+fn converted<'py, T: Element + Copy + Sync>(
     py: Python<'py>,
     depth: &PyReadonlyArray2<'py, T>,
     metres: impl Fn(&T) -> f32 + Sync,
-) -> PyResult<(Bound<'py, PyArray2<f32>>, bool)> {
+) -> PyResult<MetricDepth> {
     let shape = [depth.shape()[0], depth.shape()[1]];
-    let array = depth.as_array();
-    let values: Vec<f32> = match array.as_slice() {
-        Some(slice) => py.detach(|| slice.iter().map(&metres).collect()),
-        None => array.iter().map(&metres).collect(),
-    };
-    let valid = values.iter().any(|&z| z > 0.0);
-    Ok((PyArray1::from_vec(py, values).reshape(shape)?, valid))
+    let entries = in_c_order(depth)?;
+    let values: Vec<f32> = py.detach(|| entries.iter().map(&metres).collect());
+    let any_measured = values.iter().any(|&z| z > 0.0);
+    Ok(MetricDepth { depth: PyArray1::from_vec(py, values).reshape(shape)?.unbind(), any_measured })
 }
 
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_class::<MetricDepth>()?;
     m.add_function(wrap_pyfunction!(depth_metres, m)?)
 }

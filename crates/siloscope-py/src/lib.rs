@@ -3,7 +3,6 @@
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use siloscope::geometry::parameters::NAMES;
-use siloscope::shape_tensor::Settings;
 
 mod arrays;
 mod camera;
@@ -23,9 +22,6 @@ mod surface;
 fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add("__version__", env!("CARGO_PKG_VERSION"))?;
     m.add("PARAMETERS", PyTuple::new(m.py(), NAMES)?)?;
-    let steps = Settings::default();
-    let defaults = (steps.grid, steps.neighbours, steps.share, steps.agreement, steps.partners);
-    m.add("STEP_DEFAULTS", defaults)?;
     camera::register(m)?;
     depth::register(m)?;
     content::register(m)?;

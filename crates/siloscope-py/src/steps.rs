@@ -173,11 +173,11 @@ struct TensorArrays<'py> {
 impl TensorArrays<'_> {
     /// The tensors of `n` points.
     fn tensors(&self, n: usize) -> PyResult<Vec<ShapeTensor>> {
-        let (k1, k2, e1, e2) = (self.k1.as_array(), self.k2.as_array(), vectors(&self.e1)?, vectors(&self.e2)?);
+        let (k1, k2, e1, e2) = (in_c_order(&self.k1)?, in_c_order(&self.k2)?, vectors(&self.e1)?, vectors(&self.e2)?);
         for (what, got) in [("k1", k1.len()), ("k2", k2.len()), ("E1", e1.len()), ("E2", e2.len())] {
             same_length(what, got, n)?;
         }
-        let curvatures = k1.iter().zip(k2);
+        let curvatures = k1.iter().zip(k2.iter());
         let tensor = |((k1, k2), (e1, e2)): ((&f64, &f64), (Vec3, Vec3))| ShapeTensor { k1: *k1, k2: *k2, e1, e2 };
         Ok(curvatures.zip(e1.into_iter().zip(e2)).map(tensor).collect())
     }
@@ -257,6 +257,28 @@ fn axis_points<'py>(
     flat.into_pyarray(py).reshape([estimates.len(), 2])
 }
 
+/// Defaults of the six steps' settings.
+#[pyclass(frozen, get_all, module = "siloscope._core")]
+struct StepDefaults {
+    /// Side of the voxels, m.
+    grid: f64,
+    /// Neighbours k.
+    neighbours: usize,
+    /// Fraction of the clearly curved points that are kept.
+    share: f64,
+    /// Robust standard deviations.
+    agreement: f64,
+    /// Partners s.
+    partners: usize,
+}
+
+impl Default for StepDefaults {
+    fn default() -> Self {
+        let shape_tensor::Settings { grid, neighbours, share, agreement, partners, .. } = Default::default();
+        Self { grid, neighbours, share, agreement, partners }
+    }
+}
+
 /// `siloscope.estimation.shape_tensor.Settings`.
 #[derive(FromPyObject)]
 struct Settings {
@@ -320,6 +342,8 @@ impl From<shape_tensor::Outcome> for Outcome {
 }
 
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
+    m.add_class::<StepDefaults>()?;
+    m.add("STEP_DEFAULTS", StepDefaults::default())?;
     m.add_class::<ShapeTensors>()?;
     m.add_class::<Candidates>()?;
     m.add_class::<ConsistentDirection>()?;

@@ -280,6 +280,14 @@ impl Feed {
         self.offset + self.shape.jet(x, y)[0]
     }
 
+    /// Height of the feed surface over the vertex; NaN where the floor lies higher, and outside the silo.
+    pub fn height_above_floor(&self, x: f64, y: f64) -> f64 {
+        let r = x.hypot(y);
+        let direction = if r > 0.0 { (x / r, y / r) } else { (1.0, 0.0) };
+        let floor = if r <= self.silo.radius { self.silo.floor_height(r, direction) } else { f64::INFINITY };
+        Some(self.height(x, y)).filter(|&height| height > floor).unwrap_or(f64::NAN)
+    }
+
     /// How far the feed surface lies below a point.
     pub fn depth_below(&self, p: &Vec3) -> f64 {
         self.silo.apex() - self.height(p.x, p.y) - p.z

@@ -159,12 +159,12 @@ def metres(frame: Frame) -> NDArray[np.float32]:
         depth, unit = _narrowed(depth, unit)
     elif not raw and depth.dtype not in (np.float32, np.float64):
         depth = depth.astype(np.float64)
-    known, valid = _core.depth_metres(depth, unit)
-    if not raw and valid:
-        _not_millimetres(known, frame.source)
-    if not valid and (depth != 0).any():
+    known = _core.depth_metres(depth, unit)
+    if not raw and known.any_measured:
+        _not_millimetres(known.depth, frame.source)
+    if not known.any_measured and (depth != 0).any():
         raise InputError(f"{frame.source}: every depth is invalid (NaN, negative or {SENTINEL}); check the recording")
-    return known
+    return known.depth
 
 
 def _narrowed(depth: NDArray[np.integer[Any]], unit: float) -> tuple[NDArray[Any], float]:

@@ -24,10 +24,20 @@ Numbers = NDArray[np.float64]
 Indices = NDArray[np.uint32]
 Result = TypeVar("Result")
 
-GRID, NEIGHBOURS, SHARE, AGREEMENT, PARTNERS = _core.STEP_DEFAULTS
-"""Defaults: side of the voxels, m (step 1); neighbours k of normals and shape tensors (step 2); fraction of the clearly
-curved points that are kept as candidates (step 3); robust standard deviations by which a candidate's E1 may be off the
-perpendicular to X (step 4); partners s of each candidate (step 5)."""
+GRID = _core.STEP_DEFAULTS.grid
+"""Side of the voxels, m (step 1)."""
+
+NEIGHBOURS = _core.STEP_DEFAULTS.neighbours
+"""Neighbours k of normals and shape tensors (step 2)."""
+
+SHARE = _core.STEP_DEFAULTS.share
+"""Fraction of the clearly curved points that are kept as candidates (step 3)."""
+
+AGREEMENT = _core.STEP_DEFAULTS.agreement
+"""Robust standard deviations by which a candidate's E1 may be off the perpendicular to X (step 4)."""
+
+PARTNERS = _core.STEP_DEFAULTS.partners
+"""Partners s of each candidate (step 5)."""
 
 VIEWS = ("inside", "outside", "either")
 """From which side walls are seen; "either" is for scans from several places."""

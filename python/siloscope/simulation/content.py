@@ -39,7 +39,7 @@ EMPTY = Content(volume=0.0, area=0.0, mean_height=None, max_height=None, min_hei
 
 def content_of(silo: Silo, feed: Feed | None) -> Content:
     """Volume and heights of a feed in its silo."""
-    sums = checked(_core.feed_content, silo, feed)
-    if sums is None or sums[1] == 0.0:
+    found = checked(_core.feed_content, silo, feed)
+    if found is None or found.area == 0.0:
         return EMPTY
-    return Content(*sums)
+    return Content(found.volume, found.area, found.mean_height, found.max_height, found.min_height)

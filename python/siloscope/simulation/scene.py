@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from numbers import Integral
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,22 @@ ASTRA = Camera(width=640, height=480, fx=570.3, fy=570.3, cx=319.5, cy=239.5)
 
 LARGEST_FRAME = 1 << 24
 """Pixels."""
+
+
+class FlatPixels(NamedTuple):
+    """Exact depth (H*W,), labels (H*W,) and normals (H*W, 3), as the core reads them."""
+
+    depth: NDArray[np.float64]
+    labels: NDArray[np.uint8]
+    normals: NDArray[np.float64]
+
+
+class MeasuredPixels(NamedTuple):
+    """Measured depth (H*W,), and which pixels are false returns."""
+
+    depth: NDArray[np.float64]
+    false_returns: NDArray[np.bool_]
+
 
 WORLDS = ("silo", "wall", "corner", "shaft", "sphere", "noise", "nothing")
 """What a scene can show; all but the first are no silos, to see whether they are taken for one."""
@@ -79,24 +95,22 @@ class Scene:
         shape = (self.camera.height, self.camera.width)
         if shape[0] * shape[1] > LARGEST_FRAME:
             raise UsageError(f"a frame of {shape[1]} x {shape[0]} pixels is too large; simulate at most 16 megapixels")
-        depth, labels, normals = checked(_core.render_scene, self, threads)
-        measured, false_returns = self._measure(depth, labels, normals, threads)
+        exact = checked(_core.render_scene, self, threads)
+        seen = self._measure(FlatPixels(exact.depth, exact.labels, exact.normals), threads)
         return SimulatedFrame(
             scene=self,
-            depth=depth.reshape(shape),
-            labels=labels.reshape(shape),
-            normals=normals.reshape(*shape, 3),
-            measured=measured.reshape(shape),
-            false_returns=false_returns.reshape(shape),
+            depth=exact.depth.reshape(shape),
+            labels=exact.labels.reshape(shape),
+            normals=exact.normals.reshape(*shape, 3),
+            measured=seen.depth.reshape(shape),
+            false_returns=seen.false_returns.reshape(shape),
         )
 
-    def _measure(
-        self, depth: NDArray[np.float64], labels: NDArray[np.uint8], normals: NDArray[np.float64], threads: int
-    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        """The sensor's depths of flat exact arrays, and which are false returns."""
+    def _measure(self, exact: FlatPixels, threads: int) -> MeasuredPixels | _core.MeasuredPixels:
+        """What the sensor measures of exact pixels."""
         if self.sensor.perfect:
-            return depth.copy(), np.zeros(depth.shape, np.bool_)
-        return checked(_core.measure_depth, self.sensor, self.camera, depth, labels, normals, self.seed, threads)
+            return MeasuredPixels(exact.depth.copy(), np.zeros(exact.depth.shape, np.bool_))
+        return checked(_core.measure_depth, self.sensor, self.camera, exact, self.seed, threads)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data with the fields' names."""
@@ -198,9 +212,10 @@ class SimulatedFrame:
         """The same exact frame with other noise, or through another sensor; far quicker than rendering it again."""
         scene = replace(self.scene, seed=seed, sensor=sensor or self.scene.sensor)
         shape = self.depth.shape
-        parts = scene._measure(self.depth.ravel(), self.labels.ravel(), self.normals.reshape(-1, 3), threads)
-        measured, false_returns = parts
-        return replace(self, scene=scene, measured=measured.reshape(shape), false_returns=false_returns.reshape(shape))
+        exact = FlatPixels(self.depth.ravel(), self.labels.ravel(), self.normals.reshape(-1, 3))
+        seen = scene._measure(exact, threads)
+        measured, false_returns = seen.depth.reshape(shape), seen.false_returns.reshape(shape)
+        return replace(self, scene=scene, measured=measured, false_returns=false_returns)
 
     def raw(self, unit: float | None = None) -> NDArray[np.uint16]:
         """Measured depth in raw units of `unit` metres (default: the sensor's, else 1 mm); 0 where there is none."""

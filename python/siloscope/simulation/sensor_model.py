@@ -78,16 +78,16 @@ class SensorModel:
 
     def bias_at(self, depth: ArrayLike) -> NDArray[np.float64]:
         """Mean error at true depths, metres (Eq. 8)."""
-        return self._laws(depth)[0]
+        d = np.asarray(depth, np.float64)
+        return self._laws(d).bias.reshape(d.shape)
 
     def sigma_at(self, depth: ArrayLike) -> NDArray[np.float64]:
         """Standard deviation at true depths and perpendicular incidence, metres (Eq. 9)."""
-        return self._laws(depth)[1]
-
-    def _laws(self, depth: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         d = np.asarray(depth, np.float64)
-        bias, sigma = _core.sensor_laws(self, d.ravel())
-        return bias.reshape(d.shape), sigma.reshape(d.shape)
+        return self._laws(d).std.reshape(d.shape)
+
+    def _laws(self, depth: NDArray[np.float64]) -> _core.SensorLaws:
+        return _core.sensor_laws(self, depth.ravel())
 
 
 PERFECT = SensorModel()

@@ -147,7 +147,7 @@ fn matrix(covariance: &PyReadonlyArray2<'_, f64>) -> PyResult<Covariance> {
     if covariance.shape() != [10, 10] {
         return Err(value_error(format!("the covariance has shape {:?}, expected [10, 10]", covariance.shape())));
     }
-    Ok(Covariance::from_iterator(covariance.as_array().iter().copied()))
+    Ok(Covariance::from_iterator(arrays::in_c_order(covariance)?.iter().copied()))
 }
 
 /// Maps a bare point cloud (N, 3) over the plane perpendicular to `up`; None where there are too few points.

@@ -11,9 +11,20 @@ use numpy::PyArray1;
 use pyo3::prelude::*;
 use std::path::{Path, PathBuf};
 
-/// Width, height and channel names of every part. Raises `ValueError` naming the damage.
+/// A part of an OpenEXR file.
+#[pyclass(frozen, get_all, module = "siloscope._core")]
+pub struct ExrPart {
+    /// Columns.
+    width: usize,
+    /// Rows.
+    height: usize,
+    /// Names of its channels.
+    channels: Vec<String>,
+}
+
+/// Every part of a file. Raises `ValueError` naming the damage.
 #[pyfunction]
-pub fn exr_parts(py: Python<'_>, path: PathBuf) -> PyResult<Vec<(usize, usize, Vec<String>)>> {
+pub fn exr_parts(py: Python<'_>, path: PathBuf) -> PyResult<Vec<ExrPart>> {
     py.detach(|| headers(&path).map(|found| found.iter().map(described).collect())).map_err(value_error)
 }
 
@@ -29,10 +40,10 @@ fn headers(path: &Path) -> Result<Vec<Header>, String> {
     Ok(meta.headers.into_iter().collect())
 }
 
-fn described(header: &Header) -> (usize, usize, Vec<String>) {
+fn described(header: &Header) -> ExrPart {
     let size = header.layer_size;
-    let names = header.channels.list.iter().map(|channel| channel.name.to_string()).collect();
-    (size.width(), size.height(), names)
+    let channels = header.channels.list.iter().map(|channel| channel.name.to_string()).collect();
+    ExrPart { width: size.width(), height: size.height(), channels }
 }
 
 fn decode(path: &Path, part: usize, channel: &str) -> Result<Vec<f32>, String> {

@@ -14,6 +14,8 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_function(wrap_pyfunction!(png::decode_png16, m)?)?;
     m.add_function(wrap_pyfunction!(lzf::decompress_lzf, m)?)?;
     m.add_function(wrap_pyfunction!(rvl::decompress_rvl, m)?)?;
+    m.add_class::<tiff::TiffPage>()?;
+    m.add_class::<exr::ExrPart>()?;
     m.add_function(wrap_pyfunction!(tiff::tiff_pages, m)?)?;
     m.add_function(wrap_pyfunction!(tiff::decode_tiff, m)?)?;
     m.add_function(wrap_pyfunction!(checksum::checksum, m)?)?;

@@ -33,13 +33,22 @@ impl<R: Read + Seek> Readable for R {}
 
 type Tiff<'a> = Decoder<Box<dyn Readable + 'a>>;
 
-/// Width, height, sample type and compression of a page.
-type Page = (u32, u32, String, String);
+/// A page of a TIFF.
+#[pyclass(frozen, get_all, module = "siloscope._core")]
+pub struct TiffPage {
+    /// Columns.
+    width: u32,
+    /// Rows.
+    height: u32,
+    /// A type such as "uint16", or what stands against reading the page as depth.
+    sample_type: String,
+    /// A compression such as "LZW".
+    compression: String,
+}
 
-/// Width, height, sample type and compression of every page of a TIFF: a type such as "uint16", or what stands against
-/// reading it as depth; a compression such as "LZW". Raises `ValueError` naming the damage.
+/// Every page of a TIFF. Raises `ValueError` naming the damage.
 #[pyfunction]
-pub fn tiff_pages(py: Python<'_>, source: Source) -> PyResult<Vec<Page>> {
+pub fn tiff_pages(py: Python<'_>, source: Source) -> PyResult<Vec<TiffPage>> {
     py.detach(|| pages(&source)).map_err(value_error)
 }
 
@@ -72,7 +81,7 @@ fn open(source: &Source) -> Result<(Tiff<'_>, usize), String> {
     Ok((Decoder::new(reader).map_err(|e| e.to_string())?, size))
 }
 
-fn pages(source: &Source) -> Result<Vec<Page>, String> {
+fn pages(source: &Source) -> Result<Vec<TiffPage>, String> {
     let (mut file, _) = open(source)?;
     let mut found = vec![page(&mut file)?];
     while file.more_images() {
@@ -85,9 +94,10 @@ fn pages(source: &Source) -> Result<Vec<Page>, String> {
     Ok(found)
 }
 
-fn page(file: &mut Tiff<'_>) -> Result<Page, String> {
+fn page(file: &mut Tiff<'_>) -> Result<TiffPage, String> {
     let (width, height) = file.dimensions().map_err(|e| e.to_string())?;
-    Ok((width, height, sample_type(file)?, format!("{:?}", compression(file)?)))
+    let (sample_type, compression) = (sample_type(file)?, format!("{:?}", compression(file)?));
+    Ok(TiffPage { width, height, sample_type, compression })
 }
 
 fn sample_type(file: &mut Tiff<'_>) -> Result<String, String> {

@@ -4,7 +4,7 @@ mod factor;
 mod fit;
 mod warm_start;
 
-use crate::arrays;
+use crate::arrays::{self, in_c_order};
 use crate::convert::value_error;
 use crate::inputs::{DepthFrame, Priors};
 use crate::outcome::Refusal;
@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 use siloscope::Vec3;
 use siloscope::base::workers::Workers;
 use siloscope::fusion::relinearize::{Ray, seen_from};
-use siloscope::geometry::parameters::{PARAMETERS, Parameters};
+use siloscope::geometry::parameters::PARAMETERS;
 use siloscope::surface_fit::{fit_cloud, fit_image};
 use warm_start::WarmStart;
 
@@ -86,14 +86,18 @@ fn map_increment(
         let shapes = (bases.shape(), rays.shape(), free.shape(), places.shape());
         return Err(value_error(format!("bases, rays, free and places have shapes {shapes:?}")));
     }
-    let (bases, rays, free, places) = (bases.as_array(), rays.as_array(), free.as_array(), places.as_array());
+    let per_frame = rays.shape()[1];
+    let (bases, rays) = (in_c_order(&bases)?, in_c_order(&rays)?);
+    let (free, places) = (in_c_order(&free)?, in_c_order(&places)?);
     let seen: Vec<_> = py.detach(|| {
-        let frame = |n: usize| {
-            let (base, place) = (Parameters::from_fn(|k, _| bases[(n, k)]), Parameters::from_fn(|k, _| places[(n, k)]));
-            let of_frame: Vec<Ray> = (0..rays.shape()[1]).map(|k| [0, 1, 2].map(|c| rays[(n, k, c)])).collect();
-            seen_from(&base, &of_frame, std::array::from_fn(|k| free[(n, k)]), &place)
+        let [bases, places] = [&bases, &places].map(|rows| rows.as_chunks::<PARAMETERS>().0);
+        let free = free.as_chunks::<PARAMETERS>().0;
+        let rays: &[Ray] = rays.as_chunks::<3>().0;
+        let carried = |n: usize| {
+            let rays = rays.get(n * per_frame..(n + 1) * per_frame).unwrap_or_default();
+            seen_from(&bases[n].into(), rays, free[n], &places[n].into())
         };
-        (0..count).map(frame).collect()
+        (0..count).map(carried).collect()
     });
     let steps: Vec<f64> = seen.iter().flat_map(|(step, _)| step.iter().copied()).collect();
     let turns: Vec<f64> =

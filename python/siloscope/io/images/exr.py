@@ -70,7 +70,7 @@ class ExrSource(FrameSource):
             parts = _core.exr_parts(self.path)
         except ValueError as error:
             raise self._damaged(error) from None
-        return [Channel(i, name, (width, height)) for i, (width, height, names) in enumerate(parts) for name in names]
+        return [Channel(i, name, (part.width, part.height)) for i, part in enumerate(parts) for name in part.channels]
 
     def _items(self) -> Iterator[Item]:
         yield Item(self.path.name, self._decode)

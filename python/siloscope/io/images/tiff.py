@@ -21,9 +21,6 @@ from siloscope.types.frame import Frame
 MAGICS = (b"II*\0", b"MM\0*", b"II+\0", b"MM\0+")
 _TYPES = ("uint16", "int16", "uint32", "int32", "float16", "float32", "float64")
 
-Page = tuple[int, int, str, str]
-"""Width, height, sample type and compression."""
-
 _BY_PILLOW = "ZSTD"
 """The compression that Pillow undoes: the Rust decoder would need a second copy of Zstandard."""
 _BEST_RATIO = 1032
@@ -36,7 +33,7 @@ class TiffSource(FrameSource):
     def __init__(self, path: Path, options: Options) -> None:
         super().__init__(path, "tiff", options)
         self._pages = read_pages(path)
-        take_camera_beside(self, self._pages[0][:2])
+        take_camera_beside(self, (self._pages[0].width, self._pages[0].height))
 
     def _items(self) -> Iterator[Item]:
         for index, page in enumerate(self._pages):
@@ -47,17 +44,17 @@ class TiffSource(FrameSource):
         return len(self._pages)
 
     def _streams(self) -> list[dict[str, Any]]:
-        width, height, kind, _ = self._pages[0]
-        stream = {"name": "depth", "kind": "depth", "size": [width, height], "dtype": kind}
+        first = self._pages[0]
+        stream = {"name": "depth", "kind": "depth", "size": [first.width, first.height], "dtype": first.sample_type}
         return [{**stream, "frames": len(self._pages), "chosen": True}]
 
 
-def read_pages(path: Path) -> list[Page]:
+def read_pages(path: Path) -> list[_core.TiffPage]:
     """Sizes and types of all pages; raises `InputError` where the first is no depth image."""
     return read_pages_of(str(path), path)
 
 
-def read_pages_of(name: str, source: Path | bytes) -> list[Page]:
+def read_pages_of(name: str, source: Path | bytes) -> list[_core.TiffPage]:
     """The same for a file or the bytes of one."""
     try:
         pages = _core.tiff_pages(source)
@@ -67,18 +64,17 @@ def read_pages_of(name: str, source: Path | bytes) -> list[Page]:
     return pages
 
 
-def read_page(path: Path, index: int, page: Page) -> Frame:
+def read_page(path: Path, index: int, page: _core.TiffPage) -> Frame:
     """The depth image of one page, in raw units or metres."""
     return Frame(depth=decode_page(str(path), path, index, page), source=str(path))
 
 
-def decode_page(name: str, source: Path | bytes, index: int, page: Page) -> NDArray[Any]:
+def decode_page(name: str, source: Path | bytes, index: int, page: _core.TiffPage) -> NDArray[Any]:
     """Depth (H, W) of one page of a file or the bytes of one."""
     _check(name, page)
-    width, height, _, compression = page
-    decode = _decode_by_pillow if compression == _BY_PILLOW else _core.decode_tiff
+    decode = _decode_by_pillow if page.compression == _BY_PILLOW else _core.decode_tiff
     try:
-        depth: NDArray[Any] = decode(source, index).reshape(height, width)
+        depth: NDArray[Any] = decode(source, index).reshape(page.height, page.width)
     except ValueError as error:
         raise InputError(f"{name}: page {index} is damaged or not read ({error}); export the frame again") from None
     return depth
@@ -103,13 +99,12 @@ def read(path: Path) -> Frame:
     return read_page(path, 0, read_pages(path)[0])
 
 
-def _check(name: str, page: Page) -> None:
-    width, height, kind, _ = page
-    if kind not in _TYPES:
+def _check(name: str, page: _core.TiffPage) -> None:
+    if page.sample_type not in _TYPES:
         raise InputError(
-            f"{name}: a TIFF of {kind} is a picture, not depth; export 16-bit grey or floating-point metres"
+            f"{name}: a TIFF of {page.sample_type} is a picture, not depth; export 16-bit grey or floating-point metres"
         )
-    check_image_size(name, width, height)
+    check_image_size(name, page.width, page.height)
 
 
 FORMAT = Format("tiff", lambda head, path: head.startswith(MAGICS), TiffSource, read_one=read)

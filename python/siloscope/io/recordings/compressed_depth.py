@@ -51,8 +51,8 @@ def shape_of(image: CompressedImage, transported: bool) -> tuple[tuple[int, int]
     if head.startswith(png.MAGIC):
         return png.read_size("image", head), "float32" if floats else "uint16"
     if head.startswith(tiff.MAGICS):
-        width, height, kind, _ = tiff.read_pages_of("image", bytes(data))[0]
-        return (width, height), kind
+        page = tiff.read_pages_of("image", bytes(data))[0]
+        return (page.width, page.height), page.sample_type
     lossy = next((name for magic, name in _LOSSY.items() if head.startswith(magic)), None)
     if lossy:
         raise InputError(
