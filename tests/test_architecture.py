@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import subprocess
 import sys
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -75,3 +76,21 @@ def test_every_public_name_is_there_and_no_other() -> None:
     assert siloscope.sensors.names()
     with pytest.raises(AttributeError, match="has no attribute 'nothing'"):
         getattr(siloscope, "noth" + "ing")
+
+
+def imports(module: Path) -> set[str]:
+    """Modules of the package that a module imports, anywhere in it."""
+    names = {".".join(("siloscope", *path.with_suffix("").parts)).removesuffix(".__init__") for path in MODULES}
+    found = set()
+    for node in ast.walk(tree(module)):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("siloscope"):
+            full = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {name if name in names else str(node.module) for name in full}
+    return (found & names) - {"siloscope"}
+
+
+def test_no_module_imports_itself_through_others() -> None:
+    """In any number of steps, lazily or not; import-linter looks between folders only. The face is left out."""
+    names = {path: ".".join(("siloscope", *path.with_suffix("").parts)).removesuffix(".__init__") for path in MODULES}
+    graph = {name: imports(path) - {name} for path, name in names.items() if name != "siloscope"}
+    assert len(list(TopologicalSorter(graph).static_order())) == len(graph)  # CycleError names a circle

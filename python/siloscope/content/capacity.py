@@ -12,7 +12,8 @@ import numpy as np
 
 from siloscope.errors import InputError
 from siloscope.types.vessel import Lengths, SiloGeometry
-from siloscope.vessel.datasheet import LENGTH_STD, Datasheet
+from siloscope.vessel.datasheet import Datasheet
+from siloscope.vessel.limits import LENGTH_STD
 
 LARGEST_FILE = 10_000_000
 """Bytes of a strapping table."""

@@ -20,8 +20,9 @@ from siloscope.types.floor import Floor
 from siloscope.types.frame import Frame
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import Lengths, SiloGeometry
-from siloscope.vessel.datasheet import LENGTH_STD, Datasheet
+from siloscope.vessel.datasheet import Datasheet
 from siloscope.vessel.floor import CONTRADICTION_STD, STEEPEST_REPOSE, floor_of
+from siloscope.vessel.limits import LENGTH_STD
 from siloscope.vessel.vessel import Vessel
 
 PARAMETERS = ("r_x", "r_y", "t_x", "t_y", "radius", "cylinder_bottom", "apex", "offset", "scale", "quadratic")

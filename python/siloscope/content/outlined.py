@@ -22,7 +22,7 @@ from siloscope.types.content import Content, Level, Parts, Remark
 from siloscope.types.floor import Floor
 from siloscope.types.pose import SiloPose
 from siloscope.types.surface_map import SurfaceMap
-from siloscope.vessel.datasheet import LENGTH_STD
+from siloscope.vessel.limits import LENGTH_STD
 from siloscope.vessel.vessel import Vessel
 
 FINENESS = 240

@@ -12,7 +12,7 @@ from siloscope import _core
 from siloscope.content.knowledge import Knowledge
 from siloscope.content.setup import CoreVessel
 from siloscope.types.content import Parts
-from siloscope.vessel.datasheet import LENGTH_STD
+from siloscope.vessel.limits import LENGTH_STD
 
 STEP = 1e-4
 """Half the step of the central differences by a length, m."""

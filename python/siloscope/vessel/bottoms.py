@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.types.floor import FloorMap
-from siloscope.vessel.datasheet import LENGTH_STD
+from siloscope.vessel.limits import LENGTH_STD
 
 SIDE = 160
 """Cells of a floor's map along a side: what a kink loses between two cells is below 1e-5 of the capacity."""

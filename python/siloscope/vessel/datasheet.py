@@ -6,15 +6,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from siloscope.errors import UsageError
+from siloscope.vessel.limits import LONGEST
 
 if TYPE_CHECKING:
     from siloscope.vessel.bottoms import Bottom
 
-LONGEST = 200.0
-"""Longest length of a silo, m."""
-
-LENGTH_STD = 0.01
-"""Standard deviation of a length of a datasheet, m."""
 
 BOTTOMS = ("cone", "flat", "unknown")
 """Bottoms that an option tells."""

@@ -12,7 +12,8 @@ from dataclasses import replace
 from siloscope.types.calibration import Calibration
 from siloscope.types.content import Remark
 from siloscope.types.floor import Floor, SeenCone
-from siloscope.vessel.datasheet import LENGTH_STD, Datasheet
+from siloscope.vessel.datasheet import Datasheet
+from siloscope.vessel.limits import LENGTH_STD
 
 STEEPEST_REPOSE = math.radians(50.0)
 """Steepest slope at which feed is found: cohesive meal in the crater of a discharge."""

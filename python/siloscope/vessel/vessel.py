@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from siloscope.errors import UsageError
 from siloscope.vessel import bottoms
-from siloscope.vessel.datasheet import LONGEST, Datasheet
+from siloscope.vessel.datasheet import Datasheet
+from siloscope.vessel.limits import LONGEST
 
 if TYPE_CHECKING:
     from siloscope.schema import vessel as schema

@@ -9,6 +9,7 @@ from typing import Any
 from siloscope.errors import InputError
 from siloscope.io.recordings.messages import CAMERAS, CLOUDS, COMPRESSED, IMAGES
 from siloscope.io.recordings.recording import Recording, Topic
+from siloscope.io.recordings.ros_streams import stream_of
 from siloscope.io.recordings.streams import Stream, described
 from siloscope.io.source import FrameSource, Item, Options
 
@@ -111,10 +112,8 @@ def _note(recording: Recording, topic: Topic, stream: Stream | None, chosen: Str
 
 def _why_not(recording: Recording, topic: Topic) -> str:
     """Why a topic of images or points is no stream."""
-    from siloscope.io.recordings.vendors import ros
-
     try:
-        ros.stream_of(recording, topic)
+        stream_of(recording, topic)
     except InputError as error:
         return str(error)
     return "the same depth as in another topic"

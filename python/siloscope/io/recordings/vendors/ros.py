@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections import deque
 from pathlib import Path
 from typing import Any
@@ -10,17 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.errors import InputError
 from siloscope.io.recordings import compressed_depth, gravity, messages, ros_messages
-from siloscope.io.recordings.messages import CAMERAS, CLOUDS, COMPRESSED, IMAGES, OAK
+from siloscope.io.recordings.messages import CAMERAS, CLOUDS, COMPRESSED, OAK
 from siloscope.io.recordings.recorded import RecordedSource
 from siloscope.io.recordings.recording import Entry, Recording, Topic, or_none
+from siloscope.io.recordings.ros_streams import image_of, is_transported, streams_of
 from siloscope.io.recordings.streams import Stream
-from siloscope.io.source import Options, check_image_size
+from siloscope.io.source import Options
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
 
-_INFRARED = re.compile(r"/(ir|infra)|_ir(?![a-z])|_infra", re.IGNORECASE)
 _MILLIMETRES = 0.001
 """Unit of 16UC1 depth in ROS (REP 118)."""
 
@@ -74,56 +72,6 @@ class RosSource(RecordedSource):
         return None, why
 
 
-def streams_of(recording: Recording) -> list[Stream]:
-    """Depth and point streams; of one topic stored raw and compressed, only the raw one."""
-    found = [or_none(stream_of, recording, topic) for topic in recording.of_type(*IMAGES, *COMPRESSED, *CLOUDS)]
-    streams = [stream for stream in found if stream]
-    raw = {stream.name for stream in streams if stream.topic.type in IMAGES}
-    return [s for s in streams if s.topic.type not in COMPRESSED or _image_of(s.name) not in raw]
-
-
-def stream_of(recording: Recording, topic: Topic) -> Stream:
-    """The stream that a topic is; raises `InputError`, saying why, where it is no depth."""
-    entry = topic.entries[0]
-    if topic.type in CLOUDS:
-        cloud = messages.cloud(recording, topic, entry)
-        size = (cloud.width, cloud.height) if cloud.height > 1 else cloud.width
-        return Stream(topic.name, "points", topic, size, "float32")
-    if topic.type in COMPRESSED:
-        return _compressed_stream(topic, messages.compressed(recording, topic, entry))
-    image = messages.image(recording, topic, entry)
-    _check_depth(topic, image.encoding)
-    check_image_size("the image", image.width, image.height)
-    kind = "float32" if image.encoding == "32FC1" else "uint16"
-    return Stream(topic.name, "depth", topic, (image.width, image.height), kind)
-
-
-def _check_depth(topic: Topic, encoding: str) -> None:
-    """Raises `InputError` for images that are no depth: REP 118 has 16UC1 and 32FC1, drivers mono16 and Z16 too."""
-    if encoding not in ros_messages.DEPTH_ENCODINGS:
-        raise InputError(f"a picture ({encoding or 'no encoding'}), not depth")
-    if _INFRARED.search(topic.name):
-        raise InputError("infrared, by its name")
-    if encoding in ("mono16", "Z16") and "depth" not in topic.name.lower():
-        raise InputError(f"{encoding} without 'depth' in its name is a grey picture")
-
-
-def _compressed_stream(topic: Topic, image: compressed_depth.CompressedImage) -> Stream:
-    size, kind = compressed_depth.shape_of(image, _is_transported(topic, image))
-    if _INFRARED.search(topic.name):
-        raise InputError("infrared, by its name")
-    return Stream(topic.name, "depth", topic, size, kind)
-
-
-def _is_transported(topic: Topic, image: compressed_depth.CompressedImage) -> bool:
-    return compressed_depth.is_transported(image) or topic.name.endswith("/compressedDepth")
-
-
-def _image_of(topic: str) -> str:
-    """The topic of the raw image that a compressed one stands for."""
-    return topic.removesuffix("/compressedDepth").removesuffix("/compressed")
-
-
 def decode(recording: Recording, stream: Stream, entry: Entry) -> dict[str, Any]:
     """Depth or points of one message, as fields of `Frame`."""
     topic = stream.topic
@@ -131,7 +79,7 @@ def decode(recording: Recording, stream: Stream, entry: Entry) -> dict[str, Any]
         return {"points": ros_messages.cloud_points(messages.cloud(recording, topic, entry))}
     if topic.type in COMPRESSED:
         image = messages.compressed(recording, topic, entry)
-        depth = compressed_depth.decompress(image, _is_transported(topic, image))
+        depth = compressed_depth.decompress(image, is_transported(topic, image))
     else:
         depth = ros_messages.depth_pixels(messages.image(recording, topic, entry))
     return {"depth": depth}
@@ -145,7 +93,7 @@ def _info_of(recording: Recording, stream: Stream, frame_id: str) -> tuple[str, 
     infos = {
         topic.name: info for topic in recording.of_type(*CAMERAS) if (info := or_none(_read_info, recording, topic))
     }
-    beside = _image_of(stream.name).rsplit("/", 1)[0]
+    beside = image_of(stream.name).rsplit("/", 1)[0]
     for name in (f"{beside}/camera_info", f"{beside}/calibration"):
         if name in infos:
             return name, infos[name]
@@ -158,7 +106,7 @@ def _info_of(recording: Recording, stream: Stream, frame_id: str) -> tuple[str, 
 
 
 def _is_rectified(topic: str) -> bool:
-    return _image_of(topic).rsplit("/", 1)[-1].startswith("image_rect")
+    return image_of(topic).rsplit("/", 1)[-1].startswith("image_rect")
 
 
 def _read_info(recording: Recording, topic: Topic) -> ros_messages.CameraInfo:
