@@ -77,8 +77,8 @@ class Settings:
             return EXACT
         if isinstance(self.intrinsics, IntrinsicsStd):
             return self.intrinsics
-        own = "nominal" if "intrinsics" in frame.config else "calibrated"
-        return named(self.intrinsics or own, frame.camera)
+        name = self.intrinsics or ("nominal" if "intrinsics" in frame.config else "calibrated")
+        return self.profile.nominal_std(frame.camera) if name == "nominal" else named(name, frame.camera)
 
     def effective(self, method: str, prepared: Prepared) -> dict[str, Any]:
         """The effective settings, written beside every result."""

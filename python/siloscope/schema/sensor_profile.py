@@ -56,6 +56,17 @@ class BiasTable(StrictDocument):
     quadratic_std: NotNegative = 0.0
 
 
+class IntrinsicsStdTable(StrictDocument):
+    """``[intrinsics_std]``: how far specimens scatter about the nominal intrinsics, one standard deviation."""
+
+    f: NotNegative
+    """Of the focal lengths, as a fraction of them."""
+    c: NotNegative
+    """Of the principal point, as a fraction of the image's width."""
+    k1: NotNegative
+    """Of the first radial distortion coefficient."""
+
+
 class NoiseTable(StrictDocument):
     """``[noise]``: the law of the noise."""
 
@@ -81,6 +92,7 @@ class SensorProfileFile(StrictDocument):
     depth_unit: Annotated[float, BeforeValidator(finite), Field(ge=1e-9)] | None = None
     bias: Annotated[BiasTable, _table("bias")] = BiasTable()
     noise: Annotated[NoiseTable, _table("noise")] | None = None
+    intrinsics_std: Annotated[IntrinsicsStdTable, _table("intrinsics_std")] | None = None
     intrinsics: Annotated[list[dict[str, Any]], BeforeValidator(_tables)] = Field(default_factory=list)
 
     @model_validator(mode="after")

@@ -12,6 +12,7 @@ from typing import Any
 from siloscope.errors import InputError, UsageError
 from siloscope.parameters import BIAS, NOISE, noise_std
 from siloscope.types.camera import Camera
+from siloscope.types.intrinsics import IntrinsicsStd, named
 
 __all__ = ["UNKNOWN", "SensorProfile", "load", "names"]
 
@@ -39,10 +40,20 @@ class SensorProfile:
     """Where the figures come from."""
     intrinsics: tuple[Camera, ...] = field(default=())
     """Nominal cameras by image size; a device's own always win."""
+    intrinsics_std: tuple[float, float, float] | None = None
+    """Standard deviations of a device about them: of f (relative), of c (fraction of the width), of k1; None where the
+    library's for nominal cameras hold."""
 
     def camera(self, width: int, height: int) -> Camera | None:
         """Nominal intrinsics for an image size, or None."""
         return next((c for c in self.intrinsics if (c.width, c.height) == (width, height)), None)
+
+    def nominal_std(self, camera: Camera) -> IntrinsicsStd:
+        """How far a device's intrinsics may be off a nominal camera's."""
+        if self.intrinsics_std is None:
+            return named("nominal", camera)
+        f, c, k1 = self.intrinsics_std
+        return IntrinsicsStd(f, c * camera.width, k1)
 
     def sigma(self, depth: float) -> float | None:
         """Standard deviation of the noise at a true depth, m."""
@@ -123,6 +134,7 @@ def _parse(content: bytes, source: str) -> SensorProfile:
     from siloscope.schema.sensor_profile import parse
 
     told = parse(content, source)
+    spread = told.intrinsics_std
     return SensorProfile(
         name=source if told.name is None else told.name,
         bias=(told.bias.offset, told.bias.scale, told.bias.quadratic),
@@ -132,6 +144,7 @@ def _parse(content: bytes, source: str) -> SensorProfile:
         depth_unit=told.depth_unit,
         source=told.source,
         intrinsics=tuple(_camera(entry, source) for entry in told.intrinsics),
+        intrinsics_std=None if spread is None else (spread.f, spread.c, spread.k1),
     )
 
 
