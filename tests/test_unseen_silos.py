@@ -196,7 +196,7 @@ KINDS = {
     "feed stuck above the cone": Kind(stuck_above_the_cone, 0.8, 1.0),
     "feed stuck to much of the view": Kind(stuck_to_much_of_the_view, 0.7, 1.0),
     "feed stuck in bands": Kind(stuck_in_bands, 0.8, 1.0),
-    "feed stuck before a wide sensor": Kind(stuck_before_a_wide_sensor, 0.8, 2.0, "azure-kinect"),
+    "feed stuck before a wide sensor": Kind(stuck_before_a_wide_sensor, 0.8, 2.0, "azure-kinect", diameter=True),
     "feed below a cone, diameter known": Kind(feed_below_a_cone, 0.6, 15.0, None, diameter=True),
     "funnels below an auger": Kind(funnels_below_an_auger, 0.6, 1.0),
     "tilted funnels": Kind(tilted_funnels, 0.7, 1.0),

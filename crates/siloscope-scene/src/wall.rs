@@ -94,8 +94,11 @@ impl Wall {
                 let side = self.silo.floor.cast(&at, origin, ray).filter(|hit| hit.label == Label::Cone);
                 below.into_iter().chain(side).min_by(|a, b| a.t.total_cmp(&b.t)).or_else(|| Some(vertex()))
             }
-            // A wall that bulges out over the rim leaves a ledge there.
-            floor => floor.cast(&at, origin, ray).or_else(|| Some(level(bottom, origin, ray))),
+            // A wall that bulges out over the rim leaves a ledge there, outside of which no bottom goes on upwards.
+            floor => {
+                let below = floor.cast(&at, origin, ray).filter(|hit| hit.t >= change);
+                below.or_else(|| Some(level(bottom, origin, ray)))
+            }
         })
     }
 

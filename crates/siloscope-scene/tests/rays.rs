@@ -106,12 +106,18 @@ fn gap(wall: &Wall, p: &Vec3) -> f64 {
     };
     let share = (p.z - silo.bottom()) / silo.cone_height;
     let [x, y] = if silo.floor == Bottom::Oblique { silo.outlet_offset } else { [0.0; 2] };
+    let ledge = p.xy().norm() > silo.radius;
     match silo.floor {
-        _ if p.z < silo.bottom() => space(p, silo.radius, true),
+        Bottom::Cone | Bottom::Oblique if p.z < silo.bottom() => space(p, silo.radius, true),
         Bottom::Cone | Bottom::Oblique => {
             space(&(p - Vec3::new(share * x, share * y, 0.0)), silo.slope() * (silo.apex() - p.z), false)
         }
-        _ if p.xy().norm() > silo.radius => 0.0, // a ledge
+        _ if p.z < silo.bottom() => {
+            // a floor is a surface from above too: a hit may lie a rounding error over it
+            let below = if ledge { silo.bottom() - p.z } else { over_bottom(silo, p) };
+            space(p, silo.radius, true).min(below)
+        }
+        _ if ledge => 0.0,
         Bottom::Pyramid { .. } => over_bottom(silo, p).min(space(p, silo.radius, true)),
         _ => over_bottom(silo, p),
     }
@@ -204,4 +210,21 @@ fn the_vertex_itself_is_the_cone() {
     let wall = Wall::new(&silo, relief, 0.0, 0.0).ok();
     let hit = SiloWorld { wall, ..world }.cast(&Vec3::zeros(), &Vec3::z()).map(|hit| (hit.t, hit.label));
     assert!(matches!(hit, Some((t, Label::Cone)) if (t - 3.0).abs() < 1e-9), "{hit:?}");
+}
+
+/// The hit is a rounding error above the floor, where a point belongs to the cylinder.
+#[test]
+fn a_flat_floor_is_hit_from_straight_above() {
+    let silo = Silo {
+        radius: 1.8172019128757428,
+        cylinder_height: 0.5627268940959572,
+        cone_height: 0.0,
+        floor: Bottom::Flat,
+        ..Silo::default()
+    };
+    let wall = Wall::new(&silo, rough(&silo), 0.0, 0.4).ok();
+    let world = SiloWorld { silo: silo.clone(), wall: wall.clone(), feed: None, clutter: vec![] };
+    let ray = Vec3::new(0.0, 0.0, 0.5468956693066542);
+    let off = wall.zip(world.cast(&Vec3::zeros(), &ray)).map(|(wall, hit)| gap(&wall, &(ray * hit.t)).abs());
+    assert!(off.is_some_and(|off| off < 1e-9), "{off:?}");
 }
