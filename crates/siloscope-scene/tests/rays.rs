@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use siloscope::Vec3;
-use siloscope_scene::feed::{Base, Lumps, Shape};
+use siloscope_scene::feed_shape::{Base, Lumps, Shape};
 use siloscope_scene::{
     Bend, Bottom, Corrugation, Courses, Dent, Feed, Film, Label, Rathole, Relief, Seams, Silo, SiloWorld, Wall, World,
     volume,

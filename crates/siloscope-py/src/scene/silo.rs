@@ -3,7 +3,7 @@
 use super::fields::{number, numbers, seed};
 use crate::convert;
 use pyo3::prelude::*;
-use siloscope_scene::feed::{Base, Lumps, Shape};
+use siloscope_scene::feed_shape::{Base, Lumps, Shape};
 use siloscope_scene::{Bottom, Feed, Rathole, Sensor, Silo};
 
 pub fn pose(object: &Bound<'_, PyAny>) -> PyResult<siloscope::SiloPose> {

@@ -12,3 +12,4 @@ pub mod raycast;
 pub mod sensor;
 pub mod surface;
 pub mod vessel;
+pub mod view;

@@ -2,30 +2,9 @@
 
 use crate::Vec3;
 use crate::base::workers::Workers;
+use crate::geometry::view::View;
 use crate::shape_tensor::tensors::ShapeTensor;
 use crate::stats::neighbours::Neighbours;
-
-/// From which side the walls are seen; it tells the sign of their curvature, as normals point to the camera.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum View {
-    /// From inside: walls bend towards the camera, k1 = 1/R (Property 5).
-    #[default]
-    Inside,
-    /// From outside: walls bend away from it, and it is the other principal curvature that is not 0 but -1/R.
-    Outside,
-    /// Unknown, or from several places at once.
-    Either,
-}
-
-impl View {
-    fn allows(self, curvature: f64) -> bool {
-        match self {
-            Self::Inside => curvature > 0.0,
-            Self::Outside => curvature < 0.0,
-            Self::Either => true,
-        }
-    }
-}
 
 /// A point that may lie on a wall.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,8 @@
 //! Why to believe the six steps' axis: what must hold on walls of revolution, measured on the walls found.
 
 use crate::base::refusal::Refusal;
-use crate::shape_tensor::candidates::{Candidate, View};
+use crate::geometry::view::View;
+use crate::shape_tensor::candidates::Candidate;
 use crate::stats::robust::median;
 use crate::{SiloPose, Vec3};
 

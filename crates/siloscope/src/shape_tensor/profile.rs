@@ -2,7 +2,7 @@
 
 use crate::base::refusal::Refusal;
 use crate::geometry::surface::Cone;
-use crate::shape_tensor::candidates::View;
+use crate::geometry::view::View;
 use crate::stats::blocks::{blocks, sums};
 use crate::stats::line_fit::LineFit;
 use crate::stats::robust::{MAD_TO_STD, TUKEY, median};

@@ -4,10 +4,11 @@ use crate::base::refusal::Refusal;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
 use crate::geometry::surface::{FEED_SLOPE, Part, SurfaceTolerance};
+use crate::geometry::view::View;
 use crate::surface_fit::diagnostics::{WallEvidence, wall_evidence};
 use crate::surface_fit::likelihood::{likelihood, may_be_feed};
 use crate::surface_fit::outermost::{FILM, outermost, stuck};
-use crate::surface_fit::proposals::{Oriented, Start, View, other_part, starts, steeper_cone};
+use crate::surface_fit::proposals::{Oriented, Start, other_part, starts, steeper_cone};
 use crate::surface_fit::solver::{Fit, Prior, Problem};
 use crate::surface_fit::taper::cone_instead;
 use crate::surface_fit::tiles::{NONE, Patches};
@@ -37,7 +38,7 @@ pub fn coarse_fit(
 ) -> (Result<Settled, Refusal>, Vec<Fit>) {
     let free_size = with_free_size(prior);
     if patches.cloud {
-        let found = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Unknown);
+        let found = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Either);
         return (best_settled(patches, noise, (&free_size, pixel), found), Vec::new());
     }
     let mut from_inside = candidates(&Problem { patches, noise, prior: &free_size, pixel }, View::Inside);

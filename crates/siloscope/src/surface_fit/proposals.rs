@@ -7,6 +7,7 @@
 use crate::Vec3;
 use crate::geometry::pose::SiloPose;
 use crate::geometry::surface::{Cone, SiloSurface};
+use crate::geometry::view::View;
 use nalgebra::Matrix3;
 
 /// A patch as the start sees it: a point, its unit normal, and how sure they are.
@@ -107,17 +108,6 @@ const FINE_REACH: f64 = 0.015;
 const STEEPEST: f64 = 0.1;
 const SHALLOWEST: f64 = 2.7;
 
-/// From where the wall may be seen.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum View {
-    /// The camera is inside.
-    Inside,
-    /// The camera is outside a cylinder.
-    Outside,
-    /// Unknown: the points' origin need not be a camera, so normals have no sure sign.
-    Unknown,
-}
-
 /// The best few distinct start values, best first.
 pub fn starts(patches: &[Oriented], view: View) -> Vec<Start> {
     if patches.len() < 8 {
@@ -215,11 +205,7 @@ fn cylinder(i: &Oriented, j: &Oriented, view: View) -> Option<Hypothesis> {
     let between = j.p - i.p;
     let signed_sine = i.n.cross(&j.n).dot(&x);
     let (li, lj) = (between.cross(&j.n).dot(&x) / signed_sine, between.cross(&i.n).dot(&x) / signed_sine);
-    let seen = match view {
-        View::Inside => li > 0.0 && lj > 0.0,
-        View::Outside => li < 0.0 && lj < 0.0,
-        View::Unknown => true,
-    };
+    let seen = view == View::Either || (view.allows(li) && view.allows(lj));
     if !seen || (li.abs() - lj.abs()).abs() > 0.2 * li.abs().min(lj.abs()) {
         return None;
     }
