@@ -11,7 +11,7 @@ from siloscope.cli import options
 from siloscope.cli.outcome import print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.content import Content
-from siloscope.reporting.demo import Step, fused, locate_all, measured, scenes, write_frame
+from siloscope.reporting.demo import Step, fused, half_empty, locate_all, measured, scenes, write_frame
 from siloscope.types.calibration import Calibration
 
 
@@ -45,7 +45,7 @@ def _write(done: list[Step], calibration: Calibration, contents: list[Content], 
 
     finished = page(done, calibration, contents)
     with writing(out):
-        write_frame(done[-1].seen, out)
+        write_frame(half_empty(done), out)
         calibration.save(out / "calibration.json")
         return finished.write(out / "report.html")
 

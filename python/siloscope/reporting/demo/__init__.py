@@ -31,7 +31,7 @@ _SILO = Silo(radius=1.4, cylinder_height=3.6, cone_height=1.7, outlet_radius=0.1
 SCENE = Scene(
     silo=_SILO,
     pose=looking_at(_SILO, 0.75, -0.25, miss=(0.03, -0.02)),
-    feed=Feed("funnel+lumpy", angle=0.5),
+    feed=Feed("funnel+lumpy", level=0.3, angle=0.5),
     sensor=replace(ASTRA_S, unit=0.001, dropout=0.02, flying=0.5, max_incidence=math.radians(83.0), max_range=8.0),
     seed=7,
 )
@@ -125,6 +125,12 @@ def measured(steps: Sequence[Step], calibration: Calibration) -> Iterator[Conten
     if calibration.pose is not None:
         for step in steps:
             yield siloscope.measure(step.seen.frame(), calibration, product="wheat")
+
+
+def half_empty(steps: Sequence[Step]) -> SimulatedFrame:
+    """The frame whose level is nearest to that of `SCENE`: it shows wall, cone and feed."""
+    level = SCENE.feed.level if SCENE.feed else 0.0
+    return min(steps, key=lambda step: abs(step.level - level)).seen
 
 
 def write_frame(seen: SimulatedFrame, directory: Path) -> None:
