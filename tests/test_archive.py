@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -85,6 +86,17 @@ def test_zarrs_own_reader_agrees(tmp_path: Path) -> None:
     assert group["depth"].attrs["scale_factor"] == 0.00025
 
 
+def test_frames_are_known_again_by_their_measurements(tmp_path: Path) -> None:
+    path = tmp_path / "a"
+    archive.write(path, FRAMES[:3])
+    renamed = replace(FRAMES[1], source="another name", timestamp=0.0)
+    with archive.Writer(path) as writer:
+        assert [frame in writer for frame in (*FRAMES, renamed)] == [True] * 3 + [False] * 2 + [True]
+    shutil.rmtree(path / "digest")  # an archive of before they were kept
+    with archive.Writer(path) as writer:
+        assert [frame in writer for frame in FRAMES] == [True] * 3 + [False] * 2
+
+
 def test_writing_goes_on_across_the_chunks_of_the_small_arrays(tmp_path: Path) -> None:
     tiny = [Frame(depth=np.full((1, 2), n, np.uint16), depth_unit=0.001, timestamp=float(n)) for n in range(1030)]
     for start in (0, 400, 1023, 1025):
@@ -97,7 +109,7 @@ def test_writing_goes_on_across_the_chunks_of_the_small_arrays(tmp_path: Path) -
 
 def test_an_interruption_at_any_write_leaves_the_frames_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     calls = _write_until(tmp_path / "counted", None, monkeypatch)
-    assert calls > 18
+    assert calls > 24
     for stop in range(calls):
         path = tmp_path / f"stopped{stop}"
         assert _write_until(path, stop, monkeypatch) == stop
@@ -105,7 +117,7 @@ def test_an_interruption_at_any_write_leaves_the_frames_before(tmp_path: Path, m
             frames = read(path)
         except InputError:
             frames = []
-        finished = max(0, (stop - 4) // 6)
+        finished = max(0, (stop - 5) // 8)
         assert len(frames) >= finished
         assert all(alike(*pair) for pair in zip(FRAMES, frames, strict=False))
         if finished:
@@ -205,12 +217,16 @@ def test_a_file_in_the_way_is_not_overwritten(tmp_path: Path) -> None:
     assert sorted(path.name for path in tmp_path.iterdir()) == ["notes.txt"]
 
 
-def test_convert_makes_an_archive_and_adds_to_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_convert_makes_an_archive_and_adds_what_it_lacks(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     recording, out = str(Path(__file__).parent / "data" / "realsense.bag"), tmp_path / "all.zarr"
-    for total in (3, 6):
+    with siloscope.open(recording) as source:
+        first = next(iter(source))
+    archive.write(out, [first])
+    for written, repeated in ((2, 1), (0, 3)):
         assert main(["convert", recording, "-o", str(out), "--json"]) == 0
-        assert json.loads(capsys.readouterr().out)["frames"] == 3
-        assert len(siloscope.open(out)) == total
+        document = json.loads(capsys.readouterr().out)
+        assert (document["frames"], document["repeated"]) == (written, repeated)
+        assert len(siloscope.open(out)) == 3
     assert main(["info", str(out), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["depth_unit"] == pytest.approx(0.00025)
 

@@ -602,9 +602,38 @@ def test_the_command_writes_the_calibration(folder: Path, tmp_path: Path, capsys
     assert document == json.loads(out.read_text())
     assert document["counts"]["refused"] >= 1
     assert document["r_x"] == pytest.approx(SILO3.pose.r_x, abs=2e-4)
-    again = tmp_path / "again.json"
-    assert run(*sorted(folder.glob("*.png"))[-2:], *terms, "--continue", out, "-o", again, "--jobs", 1) == 0
-    assert len(Calibration.load(again).frames) == 8
+
+
+def test_the_command_goes_on_and_counts_no_frame_twice(folder: Path, tmp_path: Path) -> None:
+    terms = ["--depth-unit", "0.0001", "--sensor", "orbbec-astra-s", "--camera", folder / "camera.json"]
+    first, again, whole = (tmp_path / f"{name}.json" for name in ("first", "again", "whole"))
+    frames = sorted(folder.glob("*.png"))
+    renamed = tmp_path / "the same under another name.png"
+    renamed.write_bytes(frames[4].read_bytes())
+    assert run(*frames, *terms, "-o", whole) == 0
+    assert run(*frames[:5], *terms, "-o", first) == 0
+    assert run(renamed, *frames[3:], *terms, "--continue", first, "-o", again, "--jobs", 1) == 0
+    once, twice = Calibration.load(whole), Calibration.load(again)
+    assert [record.digest for record in twice.frames] == [record.digest for record in once.frames]
+    assert "frames-counted-before" in twice.quality
+    assert "frames-counted-before" not in once.quality
+    same(once, twice)
+
+
+def test_a_frame_given_twice_counts_once() -> None:
+    frames = [scene.render().frame() for scene in discharge(SILO3, 3, 0.3, 0.1)]
+    once, twice = (calibrate(taken, sensor="orbbec-astra-s") for taken in (frames, [*frames, *frames[1:]]))
+    assert len(twice.frames) == len(frames)
+    same(once, twice)
+
+
+def test_a_frame_that_could_not_be_used_may_come_again(tmp_path: Path) -> None:
+    good = [scene.render().frame() for scene in discharge(SILO3, 2, 0.3, 0.1)]
+    blind = replace(good[1], camera=None)
+    first = calibrate([good[0], blind])
+    assert first.counts["unreadable"] == 1
+    first.save(tmp_path / "first.json")
+    assert calibrate([good[0], good[1]], continue_from=tmp_path / "first.json").counts["used"] == 2
 
 
 def test_a_refusal_does_not_take_the_place_of_the_calibration_it_went_on_with(

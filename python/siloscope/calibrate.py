@@ -12,6 +12,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from siloscope.errors import UsageError
+from siloscope.fusion.counted import UncountedFrames
 from siloscope.fusion.history import History
 from siloscope.fusion.report import calibration_of
 from siloscope.fusion.schedule import FrameLocator, Inline, located, pool_of
@@ -63,7 +64,8 @@ def calibrate(
         "cone": the conical surface of these frames is the vessel's bottom; "flat"; "unknown". Without it a surface
         counts as the bottom only if it is steeper than feed can lie.
     continue_from : Calibration or path, optional
-        An earlier calibration of the same camera and silo; its frames come before these.
+        An earlier calibration of the same camera and silo; its frames come before these. A frame that it has counted
+        is known by its measurements and does not count again.
     rule : str
         One of `RULES`.
     jobs : int
@@ -95,7 +97,8 @@ def calibrate(
     ahead = 0 if jobs == 1 else 2 * jobs
     with pool_of(jobs) as pool:
         read = source.ahead(pool, ahead) if isinstance(source, FrameSource) and not isinstance(pool, Inline) else source
-        answers = list(located(progress(read) if progress else read, one, pool, ahead))
+        uncounted = UncountedFrames(progress(read) if progress else read, before)
+        answers = uncounted.marked(located(uncounted, one, pool, ahead))
     lost = source.problems if isinstance(source, FrameSource) else []
     read_until = time.perf_counter()
     told = {name: value for name, value in (("sensor", sensor), ("diameter", diameter)) if value is not None}
@@ -104,4 +107,5 @@ def calibrate(
     config["camera"] = common_camera(before, answers)
     found = calibration_of(History.of(before).extended(answers, lost), rule, config)
     times = {"frames": 1e3 * (read_until - start), "fusion": 1e3 * (time.perf_counter() - read_until)}
-    return replace(found, timing_ms=times, floor=calibrated_floor(found, bottom, before))
+    quality = (*found.quality, *uncounted.remarks)
+    return replace(found, timing_ms=times, quality=quality, floor=calibrated_floor(found, bottom, before))

@@ -17,6 +17,7 @@ FRAME_STATUSES = {
 
 CALIBRATION_REMARKS = {
     "camera-moved": "the camera moved during the sequence; only the frames since are fused",
+    "frames-counted-before": "some frames were counted already, by the hash of their measurements; each counts once",
     "few-frames": "fewer than 3 frames agree; a wrong one could not be told from a right one",
     "many-frames-disagree": "more than a quarter of the frames disagree with the rest",
     "frames-scatter": "the frames scatter over twice as far as they state; the covariance is widened by that",

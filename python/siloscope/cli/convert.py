@@ -40,8 +40,8 @@ def convert(
     [bold]Example:[/bold] siloscope convert recording.bag -o frames
 
     A folder gets one file a frame (raw depth as 16-bit PNG, metres as .npy, points as PLY), camera.json with the unit,
-    and frames.json with all else; a name that ends in .zarr makes an archive for many frames, or adds to one. Every
-    command reads both. Nothing is rounded unless --raw-unit says so.
+    and frames.json with all else; a name that ends in .zarr makes an archive for many frames, or adds to one the frames
+    that it does not have. Every command reads both. Nothing is rounded unless --raw-unit says so.
     Exit code 5 tells that some frames could not be read.
     """
     given = {"camera": camera, "depth_unit": depth_unit, "stream": stream, "ray_length": ray_length}
@@ -55,6 +55,8 @@ def convert(
         print_json(document)
     else:
         say(f"{counted(document['frames'], 'frame')} written to {out}")
+        if document["repeated"]:
+            say(f"{counted(document['repeated'], 'frame')} not written again: {out} has them already")
     return PARTIAL if document["problems"] else 0
 
 
@@ -70,7 +72,8 @@ def _document(source: FrameSource, sink: Sink, out: Path) -> dict[str, Any]:
     return {
         "schema": "siloscope.convert/1",
         "out": str(out),
-        "frames": count,
+        "frames": count - sink.repeated,
+        "repeated": sink.repeated,
         "camera": first.camera.to_dict() if first and first.camera else None,
         "depth_unit": first.depth_unit if first else None,
         "files": [str(path) for path in sink.files],

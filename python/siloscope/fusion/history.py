@@ -48,7 +48,7 @@ class History:
 
 
 def _record(number: int, answer: LocatedFrame) -> FrameRecord:
-    plain = FrameRecord(number, answer.name, "used", timestamp=answer.timestamp)
+    plain = FrameRecord(number, answer.name, "used", timestamp=answer.timestamp, digest=answer.digest)
     if answer.estimate is None:
         return replace(plain, status="unreadable", reason=str(answer.error))
     if not answer.estimate.ok:

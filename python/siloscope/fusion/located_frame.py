@@ -20,5 +20,7 @@ class LocatedFrame:
     camera: Camera | None = None
     cone_reach: tuple[float, float] | None = None
     """Distances from the axis between which it shows the bare cone, m; None where the estimate itself tells."""
+    digest: str | None = None
+    """Hash of its measurements (`Frame.digest`)."""
     made: bool = True
     """Whether it was made here; False for an estimate that the caller brought."""

@@ -1,6 +1,7 @@
 """An archive of many depth frames: a Zarr v3 folder, one compressed and checked chunk a frame.
 
-Any Zarr reader opens it: array ``depth`` (frame, row, column), ``timestamp`` (frame) and ``gravity`` (frame, 3);
+Any Zarr reader opens it: array ``depth`` (frame, row, column), ``timestamp`` (frame), ``gravity`` (frame, 3) and
+``digest`` (frame, 16), the hash of the frame's measurements;
 camera, depth unit and provenance are the group's attributes. Files are written beside their place and then renamed,
 and the array's length last, so an interruption at any moment leaves the frames before it readable.
 """
@@ -11,6 +12,7 @@ import json
 import math
 import os
 from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -37,6 +39,8 @@ _GROUP = "zarr.json"
 _LARGEST_METADATA = 1 << 20
 _ROWS = 1024
 """Frames a chunk of the small arrays."""
+_DIGEST = 16
+"""Bytes of a frame's hash."""
 _DTYPES = ("uint16", "float32", "float64")
 
 
@@ -60,6 +64,8 @@ class Writer:
         self._head: dict[str, Any] | None = None
         self._times = np.full(_ROWS, np.nan)
         self._gravities = np.full((_ROWS, 3), np.nan)
+        self._digests = np.zeros((_ROWS, _DIGEST), np.uint8)
+        self._before = frozenset[str]()
         if self.path.exists() and (not self.path.is_dir() or any(self.path.iterdir())):
             self._go_on()
 
@@ -71,6 +77,13 @@ class Writer:
         start = self.count - self.count % _ROWS
         self._times[: self.count - start] = existing.times[start:]
         self._gravities[: self.count - start] = existing.gravities[start:]
+        digests = existing.digests()
+        self._digests[: self.count - start] = digests[start:]
+        self._before = frozenset(digest.tobytes().hex() for digest in digests)
+
+    def __contains__(self, frame: Frame) -> bool:
+        """Whether the archive that is gone on with had a frame of these measurements."""
+        return bool(self._before) and frame.digest in self._before
 
     def append(self, frame: Frame) -> None:
         """Adds a depth frame; raises `InputError` for points, or a frame unlike those before."""
@@ -88,7 +101,7 @@ class Writer:
         self._write_lengths(depth)
 
     def _begin(self, head: dict[str, Any], frame: Frame) -> None:
-        for name in ("depth", "timestamp", "gravity"):
+        for name in ("depth", "timestamp", "gravity", "digest"):
             (self.path / name).mkdir(parents=True, exist_ok=True)
         self._head = head
         self._write_lengths(np.empty((head["height"], head["width"]), head["dtype"]))
@@ -107,10 +120,12 @@ class Writer:
     def _write_frame(self, frame: Frame, depth: NDArray[Any]) -> None:
         row = self.count % _ROWS
         if row == 0:
-            self._times[:], self._gravities[:] = np.nan, np.nan
+            self._times[:], self._gravities[:], self._digests[:] = np.nan, np.nan, 0
         self._times[row] = math.nan if frame.timestamp is None else frame.timestamp
         self._gravities[row] = np.nan if frame.gravity is None else frame.gravity
+        self._digests[row] = np.frombuffer(bytes.fromhex(frame.digest), np.uint8)
         chunk = self.count // _ROWS
+        _replace(self.path / "digest" / f"c.{chunk}.0", with_checksum(self._digests.tobytes()))
         _replace(self.path / "depth" / f"c.{self.count}.0.0", with_checksum(compressed(depth)))
         _replace(self.path / "timestamp" / f"c.{chunk}", with_checksum(self._times.astype("<f8").tobytes()))
         _replace(self.path / "gravity" / f"c.{chunk}.0", with_checksum(self._gravities.astype("<f8").tobytes()))
@@ -124,6 +139,7 @@ class Writer:
         arrays = {
             "timestamp": array_document([self.count], [_ROWS], "float64", ["frame"]),
             "gravity": array_document([self.count, 3], [_ROWS, 3], "float64", ["frame", "axis"]),
+            "digest": array_document([self.count, _DIGEST], [_ROWS, _DIGEST], "uint8", ["frame", "byte"]),
             "depth": array_document(
                 [self.count, height, width],
                 [1, height, width],
@@ -246,6 +262,19 @@ class ArchiveSource(FrameSource):
             if len(data) == _ROWS * width * 8:
                 rows[chunk * _ROWS : (chunk + 1) * _ROWS] = np.frombuffer(data, "<f8").reshape(-1, width)
         return rows[:last]
+
+    def digests(self) -> NDArray[np.uint8]:
+        """Hashes (frame, 16) of the frames' measurements; those of an archive that keeps none are worked out."""
+        rows = np.zeros((-(-self.declared // _ROWS) * _ROWS, _DIGEST), np.uint8)
+        for chunk in range(len(rows) // _ROWS):
+            with suppress(OSError, InputError):
+                data = without_checksum((self.path / "digest" / f"c.{chunk}.0").read_bytes())
+                if len(data) == _ROWS * _DIGEST:
+                    rows[chunk * _ROWS : (chunk + 1) * _ROWS] = np.frombuffer(data, np.uint8).reshape(-1, _DIGEST)
+        for number in np.flatnonzero(~rows[: self.declared].any(axis=1)):
+            with suppress(InputError):  # a damaged frame is told where it is read
+                rows[number] = np.frombuffer(bytes.fromhex(self._decode(int(number)).digest), np.uint8)
+        return rows[: self.declared]
 
     def _camera(self) -> Camera | None:
         fields = self.head.get("camera")

@@ -33,7 +33,7 @@ def array_document(shape: list[int], chunk: list[int], dtype: str, names: list[s
         "data_type": dtype,
         "chunk_grid": {"name": "regular", "configuration": {"chunk_shape": chunk}},
         "chunk_key_encoding": {"name": "default", "configuration": {"separator": "."}},
-        "fill_value": 0 if dtype == "uint16" else "NaN",
+        "fill_value": 0 if dtype.startswith("uint") else "NaN",
         "codecs": [BYTES, *compressor, CHECKSUM],
         "dimension_names": names,
         "attributes": {},

@@ -22,6 +22,8 @@ class Sink(Protocol):
     """Takes frames one at a time; what it wrote is complete after `finish`."""
 
     files: list[Path]
+    repeated: int
+    """Frames that were not written because the output has them already."""
 
     def add(self, frame: Frame) -> None:
         """Writes or keeps one frame; raises `UsageError` where it does not go with the ones before."""
@@ -48,6 +50,8 @@ def open_sink(out: Path, raw_unit: float | None = None) -> Sink:
 
 class FolderSink:
     """A folder with a file a frame, ``camera.json`` with the camera and unit, and ``frames.json`` with all else."""
+
+    repeated = 0
 
     def __init__(self, out: Path, raw_unit: float | None) -> None:
         self.out, self.files = out, list[Path]()
@@ -78,6 +82,8 @@ class FolderSink:
 
 class NpzSink:
     """One compressed file with the depth images stacked (F, H, W), or one cloud."""
+
+    repeated = 0
 
     def __init__(self, out: Path, raw_unit: float | None) -> None:
         self.out, self.files = out, [out]
@@ -117,6 +123,8 @@ class NpzSink:
 class PlySink:
     """One point cloud file, for one frame."""
 
+    repeated = 0
+
     def __init__(self, out: Path, raw_unit: float | None) -> None:
         self.out, self.files = out, [out]
         self._frame: Frame | None = None
@@ -142,10 +150,15 @@ class ArchiveSink:
         self.out, self.files = out, [out]
         self._raw_unit = raw_unit
         self._writer = archive.Writer(out)
+        self.repeated = 0
 
     def add(self, frame: Frame) -> None:
-        """Adds the frame behind those that are there."""
-        self._writer.append(as_raw(frame, self._raw_unit))
+        """Adds the frame behind those that are there, unless it is one of them."""
+        frame = as_raw(frame, self._raw_unit)
+        if frame in self._writer:
+            self.repeated += 1
+        else:
+            self._writer.append(frame)
 
     def finish(self) -> None:
         """Nothing is left to write."""

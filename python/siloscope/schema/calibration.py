@@ -168,6 +168,7 @@ class Record(Pose):
     timestamp: Number | None = None
     reason: str | None = None
     cone_reach: Annotated[tuple[float, float] | None, PlainValidator(_reach)] = None
+    digest: str | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> Record:

@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
-from hashlib import blake2b
 from itertools import islice
 from os import PathLike
 from pathlib import Path
-
-import numpy as np
 
 from siloscope.errors import InputError
 from siloscope.tracking.clock import Clock
@@ -81,7 +78,7 @@ def _contents(frames: Iterable[Frame], measure: Measure, jobs: int) -> Iterator[
         except InputError as error:
             content = Content("unreadable", message=str(error), source=frame.source)
         kept = Frame(timestamp=frame.timestamp, source=frame.source)
-        return kept, digest_of(frame), content
+        return kept, frame.digest, content
 
     if jobs == 1:
         yield from map(one, frames)
@@ -98,12 +95,6 @@ def batched(frames: Iterable[Frame], size: int) -> Iterator[tuple[Frame, ...]]:
     source = iter(frames)
     while some := tuple(islice(source, size)):
         yield some
-
-
-def digest_of(frame: Frame) -> str:
-    """Hash of a frame's measurements, whatever its file is called."""
-    values = frame.depth if frame.depth is not None else frame.points
-    return blake2b(b"" if values is None else np.ascontiguousarray(values).tobytes(), digest_size=16).hexdigest()
 
 
 def _together(before: float | None, now: float | None) -> bool:

@@ -46,6 +46,8 @@ class FrameRecord:
     """Why it has no answer."""
     cone_reach: tuple[float, float] | None = None
     """Distances from the axis between which it shows the bare cone, m."""
+    digest: str | None = None
+    """Hash of its measurements (`Frame.digest`); None for an estimate that was brought."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -60,6 +62,7 @@ class FrameRecord:
             "timestamp": self.timestamp,
             "reason": self.reason,
             "cone_reach": None if self.cone_reach is None else list(self.cone_reach),
+            "digest": self.digest,
         }
 
 

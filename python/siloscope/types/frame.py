@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from hashlib import blake2b
 from typing import Any
 
 import numpy as np
@@ -49,3 +50,13 @@ class Frame:
     gravity: NDArray[np.float64] | None = None
     source: str = "frame"
     provenance: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def digest(self) -> str:
+        """Hash of the measurements, by which a frame is known again whatever its file is called."""
+        return digest_of(self.depth if self.depth is not None else self.points)
+
+
+def digest_of(values: NDArray[Any] | None) -> str:
+    """Hash of measurements, in hexadecimal."""
+    return blake2b(b"" if values is None else np.ascontiguousarray(values).tobytes(), digest_size=16).hexdigest()
