@@ -103,7 +103,7 @@ wheels: $(VENV)/.installed ## builds wheels for Linux x86-64 and aarch64 into di
 requirements: $(VENV)/.installed ## pins the development set-up anew in requirements/dev.txt
 	$(BIN)/uv pip compile -q --universal --python-version 3.11 --generate-hashes \
 		--no-emit-index-url --no-emit-find-links --custom-compile-command 'make requirements' \
-		-o requirements/dev.txt pyproject.toml requirements/dev.in
+		--extra monitor --extra postgres -o requirements/dev.txt pyproject.toml requirements/dev.in
 
 hooks: $(VENV)/.installed ## installs the checks before a commit and before a push
 	$(BIN)/pre-commit install

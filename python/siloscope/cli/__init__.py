@@ -42,6 +42,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("check-volume", "check_volume:check", "Check volumes by conservation: measured beside moved."),
     Command("reconcile", "reconcile:reconcile", "Match weighbridge tickets with a track: the lot's density."),
     Command("reproduce", "reproduce:reproduce", "Repeat the paper's tables and figures, ours beside theirs."),
+    Command("serve", "serve:serve", "Serve a site: frames in, readings, alerts, the page out."),
+    Command("monitor", "monitor:monitor", "Look after a service's data: tokens, users, backup, restore, check."),
     Command("simulate", "simulate:simulate", "Write depth frames of a simulated silo, with their exact truth."),
 )
 

@@ -1,0 +1,58 @@
+"""``siloscope monitor``: tokens, users, backups and checks of a service's data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from siloscope.cli import options
+from siloscope.cli.outcome import print_json
+from siloscope.cli.progress import say
+from siloscope.cli.serve import Database, need_monitor
+from siloscope.errors import UsageError
+
+ACTIONS = ("token",)
+
+
+def monitor(
+    action: Annotated[str, typer.Argument(metavar="|".join(ACTIONS), help="What to do.")],
+    name: Annotated[str | None, typer.Argument(metavar="NAME", help="What the token is for.")] = None,
+    data: Annotated[Path | None, typer.Option("--data", metavar="DIR", help="The service's folder.")] = None,
+    database: Database = None,
+    role: Annotated[str | None, typer.Option(help="token: camera, read, metrics, admin.")] = None,
+    camera: Annotated[str | None, typer.Option(metavar="ID", help="token: the camera that it is for.")] = None,
+    as_json: options.AsJson = False,
+) -> int:
+    """Look after a service's data.
+
+    [bold]Example:[/bold] siloscope monitor token --data farm --role camera --camera cam7
+
+    token prints a new token once, on stdout.
+    """
+    need_monitor("the service")
+    from siloscope.monitor import administration as admin
+
+    if action not in ACTIONS:
+        raise UsageError(f"unknown action '{action}'; known are {', '.join(ACTIONS)}")
+    if data is None:
+        raise UsageError("say where the service's data lie with --data DIR")
+    work: dict[str, Callable[[], dict[str, Any]]] = {
+        "token": lambda: admin.token(data, database, _given(role, "--role"), camera, name),
+    }
+    found = work[action]()
+    if as_json:
+        print_json(found)
+    else:
+        print(found["printed"])
+        for line in found.get("told", ()):
+            say(line)
+    return int(found.get("exit_code", 0))
+
+
+def _given(value: str | None, what: str) -> str:
+    if value is None:
+        raise UsageError(f"give {what}; see 'siloscope monitor --help'")
+    return value

@@ -1,0 +1,1 @@
+"""The service: frames from cameras become readings, alerts and forecasts, for years (extra ``[monitor]``)."""

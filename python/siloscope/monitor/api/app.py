@@ -1,0 +1,135 @@
+"""The web application: routes, problems, headers, the page."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Awaitable, Callable
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+
+from fastapi import FastAPI, Request, Response
+from fastapi.exceptions import RequestValidationError
+from fastapi.responses import FileResponse, JSONResponse
+from sqlalchemy.exc import OperationalError
+from starlette.exceptions import HTTPException
+
+from siloscope import _core
+from siloscope.monitor.api import alerts, frames, health, models, readings, silos, stream
+from siloscope.monitor.intake import full, is_full
+from siloscope.monitor.problems import Problem
+from siloscope.monitor.service import Service
+
+PREFIX = "/api/v1"
+
+PAGE = Path(__file__).parents[1] / "page"
+
+ROUTERS = (silos.router, readings.router, frames.router, alerts.router, stream.router, health.router)
+
+HEADERS = {
+    "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
+    "connect-src 'self'; font-src 'self'; manifest-src 'self'; worker-src 'self'; base-uri 'none'; form-action 'self'; "
+    "frame-ancestors 'self'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cross-Origin-Opener-Policy": "same-origin",
+}
+
+STATUS_SLUGS = {401: "unauthorized", 403: "forbidden", 404: "not-found", 405: "method-not-allowed", 413: "too-large"}
+
+
+def create_app(service: Service) -> FastAPI:
+    """The application of a service, which is started and stopped with it."""
+
+    @asynccontextmanager
+    async def lifespan(app: FastAPI) -> AsyncIterator[None]:
+        app.state.stopping = asyncio.Event()
+        service.start()
+        yield
+        await asyncio.to_thread(service.stop)
+
+    app = FastAPI(
+        title="siloscope",
+        version=_core.__version__,
+        description="What is in every silo: readings, surfaces, events, forecasts, alerts. SI units, times in UTC.",
+        openapi_url=f"{PREFIX}/openapi.json",
+        docs_url=None,
+        redoc_url=None,
+        lifespan=lifespan,
+    )
+    app.state.service = service
+    for router in ROUTERS:
+        app.include_router(router, prefix=PREFIX)
+    app.include_router(health.outside)
+    _refuse_plainly(app)
+    app.middleware("http")(_with_headers)
+    _serve_page(app)
+    app.openapi = lambda: _described(app)  # type: ignore[method-assign]
+    return app
+
+
+def _described(app: FastAPI) -> dict[str, Any]:
+    """The OpenAPI document, with the one shape that every problem has."""
+    if app.openapi_schema is None:
+        found = FastAPI.openapi(app)
+        schemas = found.setdefault("components", {}).setdefault("schemas", {})
+        schemas["Problem"] = models.Problem.model_json_schema()
+        for name in ("HTTPValidationError", "ValidationError"):
+            schemas.pop(name, None)
+        app.openapi_schema = found
+    return app.openapi_schema
+
+
+def problem(found: Problem) -> JSONResponse:
+    """A refused request's answer."""
+    return JSONResponse(found.to_dict(), found.status, found.headers, "application/problem+json")
+
+
+def _refuse_plainly(app: FastAPI) -> None:
+    @app.exception_handler(Problem)
+    async def told(_request: Request, error: Problem) -> JSONResponse:
+        return problem(error)
+
+    @app.exception_handler(RequestValidationError)
+    async def invalid(_request: Request, error: RequestValidationError) -> JSONResponse:
+        first = error.errors()[0]
+        place = ".".join(str(part) for part in first["loc"][1:]) or "the body"
+        return problem(Problem("invalid", f"'{place}': {first['msg']}"))
+
+    @app.exception_handler(HTTPException)
+    async def http(_request: Request, error: HTTPException) -> JSONResponse:
+        slug = STATUS_SLUGS.get(error.status_code, "invalid")
+        return problem(Problem(slug, str(error.detail), dict(error.headers or {})))
+
+    @app.exception_handler(OperationalError)
+    async def database(request: Request, error: OperationalError) -> JSONResponse:
+        if is_full(error):
+            return problem(full(request.app.state.service.blobs))
+        return problem(Problem("unavailable", "the database can't be reached or is busy", {"Retry-After": "5"}))
+
+
+async def _with_headers(request: Request, call: Callable[[Request], Awaitable[Response]]) -> Response:
+    response = await call(request)
+    for name, value in HEADERS.items():
+        response.headers.setdefault(name, value)
+    if request.url.path.startswith(PREFIX):
+        response.headers.setdefault("Cache-Control", "no-store")
+    return response
+
+
+def _serve_page(app: FastAPI) -> None:
+    """The built page: files by name, and its index for every address that is no file."""
+
+    @app.get("/{path:path}", include_in_schema=False)
+    def page(path: str) -> Response:
+        if path.startswith(("api/", "metrics", "healthz", "readyz")):
+            raise Problem("not-found", f"there is nothing at '/{path[:100]}'")
+        file = (PAGE / path).resolve()
+        if not file.is_relative_to(PAGE) or not file.is_file():
+            file = PAGE / "index.html"
+        if not file.is_file():
+            raise Problem("not-found", f"the page is not built; the interface is at {PREFIX}/openapi.json")
+        hashed = "assets" in file.parts
+        return FileResponse(
+            file, headers={"Cache-Control": "public, max-age=31536000, immutable" if hashed else "no-cache"}
+        )

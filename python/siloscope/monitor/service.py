@@ -1,0 +1,145 @@
+"""The parts of a running service, put together; started and stopped in order."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from siloscope.monitor import site
+from siloscope.monitor.alerts import Alerting, add_defaults
+from siloscope.monitor.blobs import Blobs
+from siloscope.monitor.calibrating import Calibrating
+from siloscope.monitor.clock import DAY, Clock, SystemClock
+from siloscope.monitor.intake import Intake
+from siloscope.monitor.measuring import Measuring
+from siloscope.monitor.outbox import Outbox
+from siloscope.monitor.settings import Settings
+from siloscope.monitor.store import changes, frames, places
+from siloscope.monitor.store.engine import Store, new_id, opened
+from siloscope.monitor.story import Storyteller
+from siloscope.monitor.workers import CalibrationFiles
+
+BEAT_S = 1.0
+"""How often what readings changed is told anew."""
+
+
+@dataclass(frozen=True)
+class Swept:
+    """What the start found and put right."""
+
+    stray: int
+    """Unfinished files."""
+    requeued: int
+    """Frames that were in a worker."""
+    damaged: int
+    """Frames of the last day whose bytes are gone or wrong."""
+
+
+class Service:
+    """Everything but the web server."""
+
+    def __init__(self, settings: Settings, clock: Clock | None = None) -> None:
+        settings.data.mkdir(parents=True, exist_ok=True)
+        self.settings = settings
+        self.clock = clock or SystemClock()
+        self.store: Store = opened(settings.url)
+        self.blobs = Blobs(settings.data / "frames")
+        self.outbox = Outbox(self.store)
+        self.intake = Intake(self.store, self.blobs, settings.limits, self.clock)
+        self.files = CalibrationFiles(settings.data / "calibrations")
+        self.measuring = Measuring(
+            self.store, self.blobs, self.files, settings.limits, self.clock, self.changed, settings.idle_s
+        )
+        self.calibrating = Calibrating(self.store, self.blobs, settings.limits, self.clock, self.measuring.wake)
+        self._stories, self._alerting = Storyteller(self.store), Alerting(self.store, self.outbox)
+        self._dirty: dict[str, int] = {}
+        self._lock, self._stopping = threading.Lock(), threading.Event()
+        self._threads: list[threading.Thread] = []
+        self.listeners: list[Callable[[], None]] = []
+        """Called when something changed, from any thread."""
+        self.started = self.clock.now()
+
+    def prepare(self) -> Swept:
+        """Sweeps, requeues, applies SITE.toml."""
+        now = self.clock.now()
+        swept = Swept(self.blobs.sweep(), frames.requeue_interrupted(self.store), self._check_recent(now))
+        with self.store.write() as connection:
+            if places.fact(connection, "box") is None:
+                places.set_fact(connection, "box", new_id())
+            add_defaults(connection, now)
+            if self.settings.site is not None:
+                site.apply(connection, site.read(self.settings.site), self.settings.site, now)
+        return swept
+
+    def _check_recent(self, now: int) -> int:
+        """Fails the waiting frames of the last day whose bytes can't be relied on."""
+        with self.store.read() as connection:
+            recent = frames.received_since(connection, now - DAY)
+        damaged = [row for row in recent if not self.blobs.intact(row.sha256)]
+        for row in damaged:
+            with self.store.write() as connection:
+                why = "the stored bytes are gone or damaged; send the frame again"
+                frames.settle(connection, row.id, row.silo, frames.FAILED, now, error=why, kept=False)
+        return len(damaged)
+
+    def start(self) -> None:
+        """Starts workers and the beat."""
+        self.measuring.start(self.settings.workers)
+        self.calibrating.start()
+        thread = threading.Thread(target=self._run, name="beat", daemon=True)
+        thread.start()
+        self._threads.append(thread)
+
+    def stop(self) -> None:
+        """Ends them all."""
+        self._stopping.set()
+        self.measuring.stop()
+        self.calibrating.stop()
+        for thread in self._threads:
+            thread.join(5)
+        self.store.close()
+
+    def changed(self, silo: str, time: int) -> None:
+        """Says that a silo's readings changed at a time: its story is told anew from there."""
+        with self._lock:
+            self._dirty[silo] = min(time, self._dirty.get(silo, time))
+        self.calibrating.wake()
+        self.announce()
+
+    def announce(self) -> None:
+        """Says that the log of changes has grown."""
+        for listener in list(self.listeners):
+            listener()
+
+    def _run(self) -> None:
+        ticked = 0
+        while not self._stopping.wait(BEAT_S):
+            self.beat()
+            now = self.clock.now()
+            if now - ticked >= self.settings.tick:
+                ticked = now
+                self.tick()
+
+    def beat(self) -> None:
+        """Stories and rules of the silos whose readings changed."""
+        with self._lock:
+            dirty, self._dirty = self._dirty, {}
+        for silo, since in dirty.items():
+            now = self.clock.now()
+            self._stories.tell(silo, since, now)
+            self._alerting.look(silo, now)
+        if dirty:
+            self.announce()
+        self.outbox.deliver(self.clock.now())
+
+    def tick(self) -> None:
+        """Rules of all silos, for what has not come."""
+        with self.store.read() as connection:
+            silos = [row.id for row in places.listed(connection, "silo")]
+            before = changes.newest(connection)
+        for silo in silos:
+            self._alerting.look(silo, self.clock.now())
+        with self.store.read() as connection:
+            if changes.newest(connection) != before:
+                self.announce()

@@ -1,0 +1,1 @@
+"""Tests of the service, against the real server in a process of its own."""
