@@ -29,11 +29,15 @@ pub enum Refusal {
     AmbiguousVessel,
     /// The axis contradicts the given gravity.
     GravityContradicts,
+    /// A bare cylinder, seen from aside: it could as well be upside down.
+    EndUnknown,
+    /// The vessel's lower end lies behind the camera.
+    AboveHorizon,
 }
 
 impl Refusal {
     /// Every reason.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::NoDepth,
         Self::NoWall,
         Self::Flat,
@@ -47,6 +51,8 @@ impl Refusal {
         Self::Deformed,
         Self::AmbiguousVessel,
         Self::GravityContradicts,
+        Self::EndUnknown,
+        Self::AboveHorizon,
     ];
 
     /// Stable name, what it means, and what to try.
@@ -116,6 +122,16 @@ impl Refusal {
                 "gravity-contradicts",
                 "the wall's axis contradicts the given gravity by more than five standard deviations",
                 "check gravity's signs and the camera's axes, or leave gravity out",
+            ),
+            Self::EndUnknown => (
+                "end-unknown",
+                "only the side of a cylinder is in view, from a camera that looks sideways; its lower end can't be told",
+                "give gravity, or turn the camera so that floor, hopper or feed is in view",
+            ),
+            Self::AboveHorizon => (
+                "above-horizon",
+                "the camera looks above the horizon, where the pose is not defined",
+                "turn the camera downwards, or check gravity's signs and the camera's axes",
             ),
         }
     }

@@ -20,14 +20,18 @@ pub struct WallEvidence {
     pub turn: f64,
     /// Standard error of `turn`.
     pub turn_std: f64,
+    /// `turn` and its standard error on the cylinder alone; NaN and infinite where hardly any of it is seen.
+    pub turn_of_cylinder: [f64; 2],
     /// Turn of the normal along the generatrix, in units of 1/R: 0 on cylinder and cone, 1 on a sphere.
     pub bend: f64,
     /// Standard error of `bend`.
     pub bend_std: f64,
     /// Angle about the axis that the wall patches cover, radians.
     pub arc: f64,
-    /// Share of all patches that lie behind the wall, where nothing can be.
+    /// Fraction of all patches that lie behind the cylinder, where nothing can be.
     pub behind: f64,
+    /// Fraction of all patches that lie behind the cone: it is no closed bottom.
+    pub behind_cone: f64,
     /// Share of what runs along the wall that lies before it.
     pub stuck: f64,
 }
@@ -80,7 +84,7 @@ const REACH: usize = 4;
 /// Measures the evidence on the patches with weight in `fit`.
 pub fn wall_evidence(patches: &Patches, fit: &Fit, placed: &SurfaceEvaluator, wall: &[bool]) -> WallEvidence {
     let seats: Vec<Option<Seat>> = (0..patches.list.len()).map(|i| seat(patches, fit, placed, wall, i)).collect();
-    let (mut turn, mut bend) = (Slope::default(), Slope::default());
+    let (mut turn, mut of_cylinder, mut bend) = (Slope::default(), Slope::default(), Slope::default());
     for (i, seat) in seats.iter().enumerate() {
         let Some(from) = seat else { continue };
         for direction in [2, 4, 6, 7] {
@@ -92,6 +96,9 @@ pub fn wall_evidence(patches: &Patches, fit: &Fit, placed: &SurfaceEvaluator, wa
             let around = wrapped(to.azimuth - from.azimuth);
             let turned = wrapped(to.normal_azimuth - from.normal_azimuth);
             turn.add(around * from.normal_radial, turned * from.normal_radial, weight);
+            if from.part == Part::Cylinder {
+                of_cylinder.add(around, turned, weight);
+            }
             let along = (to.along - from.along) / (0.5 * (from.rho + to.rho));
             if along.abs() > 0.5 * around.abs() {
                 bend.add(along, to.normal_polar - from.normal_polar, weight);
@@ -100,15 +107,18 @@ pub fn wall_evidence(patches: &Patches, fit: &Fit, placed: &SurfaceEvaluator, wa
     }
     let ((turn, turn_std), (bend, bend_std)) = (turn.fit(), bend.fit());
     let n = seats.iter().flatten().count();
+    let [behind, behind_cone] = behind(patches, fit, placed, wall);
     WallEvidence {
         patches: n,
         share: n as f64 / patches.list.len().max(1) as f64,
         turn,
         turn_std,
+        turn_of_cylinder: of_cylinder.fit().into(),
         bend,
         bend_std,
         arc: arc(seats.iter().flatten().map(|s| s.azimuth)),
-        behind: behind(patches, fit, placed, wall),
+        behind,
+        behind_cone,
         stuck: 0.0,
     }
 }
@@ -171,18 +181,19 @@ fn arc(azimuths: impl Iterator<Item = f64>) -> f64 {
     bins.iter().filter(|&&n| n > 0).count() as f64 * std::f64::consts::TAU / 72.0
 }
 
-/// Share of patches that lie clearly behind the wall as seen from the camera.
-fn behind(patches: &Patches, fit: &Fit, placed: &SurfaceEvaluator, wall: &[bool]) -> f64 {
+/// Fractions of the patches that lie clearly behind the cylinder and behind the cone as seen from the camera.
+fn behind(patches: &Patches, fit: &Fit, placed: &SurfaceEvaluator, wall: &[bool]) -> [f64; 2] {
     let list = &patches.list;
     let reach = |p: f64| 0.05 * p;
-    let outside = |i: &usize| {
-        let patch = &list[*i];
-        let p = patch.at(if patches.cloud { 0.0 } else { fit.bias.true_depth(patch.measured) });
-        let at = placed.local(&p);
-        at.value / at.gradient.norm() > reach(at.p.xy().norm()) + 5.0 * fit.misfit
-    };
+    let mut count = [0.0; 2];
     if !fit.inside || patches.cloud {
-        return 0.0;
+        return count;
     }
-    (0..list.len()).filter(|&i| !wall[i]).filter(outside).count() as f64 / list.len().max(1) as f64
+    for patch in list.iter().zip(wall).filter(|(_, wall)| !**wall).map(|(patch, _)| patch) {
+        let at = placed.local(&patch.at(fit.bias.true_depth(patch.measured)));
+        if at.value / at.gradient.norm() > reach(at.p.xy().norm()) + 5.0 * fit.misfit {
+            count[usize::from(at.part == Part::Cone)] += 1.0;
+        }
+    }
+    count.map(|n| n / list.len().max(1) as f64)
 }

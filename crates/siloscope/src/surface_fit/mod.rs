@@ -104,7 +104,8 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge, known: Option<&KnownWall>
             match found {
                 Ok(found) => fit_from(problem, image, know, (found, Looks::Usual, &proposals), &mut clock)?,
                 Err(why) if know.vessels == Vessels::Coaxial => return Err(why),
-                Err(why) => fit_inside(&problem, image, know, None, &proposals, &mut clock).map_err(|_| why)?,
+                Err(why) => fit_inside(&problem, image, know, None, &proposals, &mut clock)
+                    .map_err(|own| if own == Refusal::NoWall { why } else { own })?,
             }
         }
     };

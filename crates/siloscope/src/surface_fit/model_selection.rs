@@ -182,7 +182,7 @@ pub(crate) fn judge(e: &WallEvidence, inside: bool, cloud: bool) -> Result<(), R
     if !straight {
         return Err(Refusal::Bent);
     }
-    if e.behind > 0.05 {
+    if e.behind + e.behind_cone > 0.05 {
         return Err(Refusal::BehindWall);
     }
     Ok(())

@@ -169,11 +169,34 @@ fn without_planes(patches: &[Oriented], random: &mut Random) -> Vec<Oriented> {
         let count = |plane: &Oriented| sample.iter().filter(|o| on(o, plane)).count();
         let planes = (0..PLANE_TRIALS).map(|_| rest[random.below(rest.len())]).map(|p| (count(&p), p));
         match planes.max_by_key(|(n, _)| *n) {
-            Some((n, plane)) if n * 4 > sample.len() => rest.retain(|o| !on(o, &plane)),
+            Some((n, plane)) if n * 4 > sample.len() && !is_curved(sample.iter().filter(|o| on(o, &plane))) => {
+                rest.retain(|o| !on(o, &plane))
+            }
             _ => break,
         }
     }
     rest
+}
+
+/// Least fraction of the normals' scatter over a surface that follows the position where the surface is curved.
+const CURVED: f64 = 0.25;
+
+/// Whether the normals of patches turn with their position: those of a plane scatter without regard to it.
+fn is_curved<'a>(patches: impl Iterator<Item = &'a Oriented> + Clone) -> bool {
+    let (n, p, normal) =
+        patches.clone().fold((0.0, Vec3::zeros(), Vec3::zeros()), |(n, p, normal), o| (n + 1.0, p + o.p, normal + o.n));
+    let (p, normal) = (p / f64::max(n, 1.0), normal / f64::max(n, 1.0));
+    let (mut pp, mut np, mut nn) = (Matrix3::zeros(), Matrix3::zeros(), 0.0);
+    for o in patches {
+        let (dp, dn) = (o.p - p, o.n - normal);
+        pp += dp * dp.transpose();
+        np += dn * dp.transpose();
+        nn += dn.norm_squared();
+    }
+    // regression on the position, of which the plane's own normal direction has hardly any scatter
+    let ridge = Matrix3::identity() * (1e-3 * pp.trace());
+    let Some(inverse) = (pp + ridge).try_inverse() else { return false };
+    (np * inverse * np.transpose()).trace() > CURVED * nn
 }
 
 /// Keeps the best hypotheses that differ from each other.

@@ -105,10 +105,10 @@ impl<'a> Tile<'a> {
         if let Some(mean) = self.mean_of_sums(&nodes) {
             return mean;
         }
-        if self.side <= MAX_SIDE / 2 {
-            self.mean::<{ MAX_SIDE / 2 }>(base, |v| smooth.row(v as f32).values())
-        } else {
-            self.mean::<MAX_SIDE>(base, |v| smooth.row(v as f32).values())
+        match self.side {
+            ..=8 => self.mean::<8>(base, |v| smooth.row(v as f32).values()),
+            9..=16 => self.mean::<16>(base, |v| smooth.row(v as f32).values()),
+            _ => self.mean::<MAX_SIDE>(base, |v| smooth.row(v as f32).values()),
         }
     }
 

@@ -4,7 +4,7 @@ use crate::geometry::depth_image::DepthImage;
 use crate::stats::robust::{MAD_TO_STD, upper_median};
 
 /// Largest side of a tile, pixels.
-pub const MAX_SIDE: usize = 16;
+pub const MAX_SIDE: usize = 32;
 
 /// Sums of a plane fit z = a + b·u + c·v over pixels, u and v relative to the tile's centre.
 #[derive(Debug, Clone, Copy, Default)]
@@ -144,9 +144,8 @@ impl Tile {
     }
 }
 
-/// The tiles of the image, row by row; `None` where too little was measured.
-pub fn tiles(image: &DepthImage, side: usize, (columns, rows): (usize, usize)) -> Vec<Option<Tile>> {
-    let enough = 0.3 * (side * side) as f64;
+/// The tiles of the image, row by row; `None` where fewer than `enough` pixels were measured.
+pub fn tiles(image: &DepthImage, side: usize, (columns, rows): (usize, usize), enough: f64) -> Vec<Option<Tile>> {
     let centre = (side as f64 - 1.0) / 2.0;
     let mut tiles = Vec::with_capacity(columns * rows);
     let mut band = vec![PlaneSums::default(); columns];

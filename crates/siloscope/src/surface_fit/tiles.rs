@@ -84,15 +84,49 @@ pub struct Patches {
 /// Side of the tiles: about 80 of them across the image, or as few as 40 where they would be narrower than 8 pixels.
 pub fn tile_side(width: usize) -> usize {
     let across = |tiles: f64| (width as f64 / tiles).round() as usize;
-    across(80.0).max(across(40.0).min(8)).clamp(4, MAX_SIDE)
+    across(80.0).max(across(40.0).min(8)).clamp(4, MAX_DENSE_SIDE)
+}
+
+/// Largest side of a tile that has most of its pixels.
+const MAX_DENSE_SIDE: usize = 16;
+/// A tile of this fraction of its pixels tells as much as is needed: where fewer are there, tiles are larger.
+const DENSE: f64 = 0.5;
+/// Fraction of the expected pixels that a tile needs, and that a smooth one has.
+const ENOUGH: f64 = 0.3;
+const MOST: f64 = 0.5;
+
+/// Fraction of the pixels that were measured where any was: over squares of a tile's size that have one at least.
+fn density(image: &DepthImage, side: usize) -> f64 {
+    let is_there = |z: &&f32| **z > 0.0 && **z < f32::INFINITY;
+    let (mut measured, mut squares) = (0, 0);
+    let mut band = vec![0usize; image.width / side];
+    for rows in image.depth.chunks_exact(image.width * side) {
+        band.fill(0);
+        for row in rows.chunks_exact(image.width) {
+            for (count, depths) in band.iter_mut().zip(row.chunks_exact(side)) {
+                *count += depths.iter().filter(is_there).count();
+            }
+        }
+        measured += band.iter().sum::<usize>();
+        squares += band.iter().filter(|n| **n > 0).count();
+    }
+    measured as f64 / (squares * side * side).max(1) as f64
+}
+
+/// Side of the tiles for a density, and the pixels that are expected in one.
+fn sparse_side(side: usize, density: f64) -> (usize, f64) {
+    let wider = side as f64 * (DENSE / density.max(1e-3)).sqrt().max(1.0);
+    let side = (wider.round() as usize).min(MAX_SIDE);
+    (side, (side * side) as f64 * if density < DENSE { density } else { 1.0 })
 }
 
 /// Cuts a depth image into tiles. `noise` is the expected noise where it is known.
 pub fn tile_patches(image: &DepthImage, noise: Option<&NoiseLaw>) -> Patches {
-    let side = tile_side(image.width);
+    let dense = tile_side(image.width);
+    let (side, pixels) = sparse_side(dense, density(image, dense));
     let (columns, rows) = (image.width / side, image.height / side);
     let place = |i: usize| ((i % columns) * side, (i / columns) * side);
-    let mut tiles = tiles(image, side, (columns, rows));
+    let mut tiles = tiles(image, side, (columns, rows), ENOUGH * pixels);
     let law = noise.copied().unwrap_or_else(|| noise_of(&tiles));
     for (i, tile) in tiles.iter_mut().enumerate() {
         if let Some(rough) = tile.filter(|t| t.scatter > 1.5 * law.sigma(t.depth()) + 3e-4 * t.depth()) {
@@ -106,7 +140,7 @@ pub fn tile_patches(image: &DepthImage, noise: Option<&NoiseLaw>) -> Patches {
     let mut index = vec![NONE; columns * rows];
     for (i, index) in index.iter_mut().enumerate() {
         if let Some((patch, rays)) =
-            patch(image, &tiles, (i % columns, i / columns), (columns, rows), (side, common_noise))
+            patch(image, &tiles, (i % columns, i / columns), (columns, rows), (side, common_noise, MOST * pixels))
         {
             *index = patches.list.len() as u32;
             patches.list.push(patch);
@@ -154,7 +188,7 @@ fn patch(
     tiles: &[Option<Tile>],
     (column, row): (usize, usize),
     (columns, rows): (usize, usize),
-    (side, common): (usize, f64),
+    (side, common, most): (usize, f64, f64),
 ) -> Option<(Patch, TileRays)> {
     let tile = tiles[row * columns + column].as_ref()?;
     let Tile { sums: own, plane, scatter } = *tile;
@@ -197,7 +231,7 @@ fn patch(
         sigma_normal,
         scatter,
         count: own.n,
-        smooth: joined >= 3 && own.n >= 0.5 * step * step,
+        smooth: joined >= 3 && own.n >= most,
         tile: (column as u32, row as u32),
     };
     Some((patch, rays))
@@ -328,7 +362,7 @@ mod tests {
 
     #[test]
     fn tiles_of_small_images_stay_wide_enough_for_a_plane() {
-        let sides = [[80, 4], [160, 4], [224, 6], [320, 8], [512, 8], [640, 8], [1024, 13], [4096, MAX_SIDE]];
+        let sides = [[80, 4], [160, 4], [224, 6], [320, 8], [512, 8], [640, 8], [1024, 13], [4096, MAX_DENSE_SIDE]];
         for [width, side] in sides {
             assert_eq!(tile_side(width), side, "{width}");
         }

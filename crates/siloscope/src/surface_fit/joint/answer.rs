@@ -1,16 +1,14 @@
-//! From the weighed models to an answer in the twelve parameters that frames share, or the reason why there is none.
+//! From the weighed models to an answer in the twelve parameters that frames share.
 
 use crate::Vec3;
-use crate::base::refusal::Refusal;
 use crate::fusion::frame_factor::FrameFactor;
 use crate::geometry::convex_vessel::ConvexVessel;
 use crate::geometry::parameters::{Information, PARAMETERS, Parameters};
 use crate::geometry::surface::{Cone, Part, SiloSurface};
-use crate::surface_fit::joint::form::{GROUPS, Group};
 use crate::surface_fit::joint::frame::Frame;
-use crate::surface_fit::joint::model::{Amplitudes, HOPPER_SLOPE, Model, prior};
+use crate::surface_fit::joint::model::Model;
 use crate::surface_fit::joint::parameters::{BIAS, CAMERA, INTERCEPT, RADIUS, SIZE, SLOPE};
-use crate::surface_fit::joint::search::{LEAST_ARC, OVAL_COLUMN, Search, cylinder_arc, tiles_met, wall_tiles};
+use crate::surface_fit::joint::search::{OVAL_COLUMN, Search};
 use crate::surface_fit::joint::select::{Average, averaged};
 use crate::surface_fit::joint::solve::JointFit;
 use crate::surface_fit::joint::system::Prior;
@@ -39,90 +37,6 @@ pub struct JointAnswer {
     pub best: usize,
     /// Errors of the intrinsics: focal lengths (relative), principal point (rays), k1.
     pub camera: [f64; 5],
-}
-
-/// Most of the tiles' model error that is a wall's, as a fraction of the radius.
-const MOST_TAU: f64 = 0.012;
-/// Largest correlation factor of a wall.
-const MOST_CORRELATION: f64 = 45.0;
-/// Fewer tiles of the cylinder than these don't fix where it is.
-const LEAST_CYLINDER: f64 = 12.0;
-/// Fewer than this fraction leave it to the cone where the axis runs: it must be round and steeper than feed.
-const WEAK_CYLINDER: f64 = 0.05;
-/// Ovality amplitude, over its first value, beyond which a cone is not round: an oblique one is an oval right one.
-const ROUND: f64 = 2.0;
-/// Models with more probability than this that differ by more than the answer's limits make it ambiguous.
-const COMPARABLE: f64 = 0.01;
-/// A contradiction of gravity by more than this many standard deviations is no chance.
-const CONTRADICTION: f64 = 5.0;
-
-/// Refuses what is no silo's wall, or not surely.
-pub fn judge(frame: &Frame, search: &Search) -> Result<(), Refusal> {
-    let best = search.weighed.first().ok_or(Refusal::NoWall)?;
-    let fit = search.fits.get(best.fit).ok_or(Refusal::NoWall)?;
-    let [cylinder, cone] = wall_tiles(fit);
-    let all = tiles_met(fit).max(1.0);
-    let weak = cylinder < WEAK_CYLINDER * all && cone > cylinder;
-    let sound = fit.state.x[SLOPE] < HOPPER_SLOPE && is_round(fit);
-    if best.model.is_cone_alone() || cylinder < LEAST_CYLINDER || weak && !sound {
-        return match frame.inputs.gravity {
-            Some(_) if best.model.is_cone_alone() && agrees_with_gravity(frame, fit, best.model) => Ok(()),
-            _ => Err(Refusal::ConeAlone),
-        };
-    }
-    let size = fit.state.size();
-    let main = usize::from(cylinder < cone);
-    if fit.tau[0] > MOST_TAU * size || fit.correlation[main] > MOST_CORRELATION {
-        return Err(Refusal::NoWall);
-    }
-    if frame.inputs.gravity.is_some() && !agrees_with_gravity(frame, fit, best.model) {
-        return Err(Refusal::GravityContradicts);
-    }
-    if fit.amplitudes.at_cap(size).is_some() {
-        return Err(Refusal::Deformed);
-    }
-    if best.model == Model::Cylinder && cylinder_arc(fit) < LEAST_ARC {
-        return Err(Refusal::PoorlyDetermined);
-    }
-    Ok(())
-}
-
-/// Whether the wall shows no more ovality than is expected of any.
-fn is_round(fit: &JointFit) -> bool {
-    let first = Amplitudes::first(fit.state.size()).form;
-    GROUPS
-        .iter()
-        .zip(fit.amplitudes.form.iter().zip(first))
-        .all(|(g, (a, first))| *g != Group::Oval || *a < ROUND * first)
-}
-
-/// Whether the axis without the gravity prior agrees with gravity.
-fn agrees_with_gravity(frame: &Frame, fit: &JointFit, model: Model) -> bool {
-    let Some((pose, std)) = frame.inputs.gravity else { return true };
-    let first = Amplitudes::first(fit.state.size()); // a form that was bent to meet gravity is none
-    let mut prior = prior(model, &fit.state, frame.inputs, frame.form, Some(&first));
-    prior.mean[..2].copy_from_slice(&fit.state.x[..2]);
-    prior.std[..2].fill(1.0);
-    let Some(free) = fit.quadratic.posterior(&fit.state.x, &prior) else { return false };
-    let covariance = free.covariance();
-    let off = [pose.r_x - fit.state.x[0] - free.step[0], pose.r_y - fit.state.x[1] - free.step[1]];
-    let spread = nalgebra::Matrix2::new(
-        covariance[(0, 0)] + (std / pose.r_y.cos().abs().max(1e-3)).powi(2),
-        covariance[(0, 1)],
-        covariance[(1, 0)],
-        covariance[(1, 1)] + std * std,
-    );
-    let off = nalgebra::Vector2::from(off);
-    spread.try_inverse().is_some_and(|inverse| off.dot(&(inverse * off)) < CONTRADICTION * CONTRADICTION)
-}
-
-/// Whether models that are comparable differ by more than an answer may.
-pub fn is_ambiguous(search: &Search, direction: f64, position: f64) -> bool {
-    let Some(best) = search.weighed.first() else { return true };
-    search.weighed.iter().filter(|w| w.probability > COMPARABLE).any(|w| {
-        let off = |k: usize| w.mean[k] - best.mean[k];
-        off(0).hypot(off(1)) > direction || off(2).hypot(off(3)) > position
-    })
 }
 
 /// The answer of weighed models; `hopper` tells whether the cone is known to be the silo's own, `scale` is the standard

@@ -7,9 +7,11 @@
 
 pub mod answer;
 pub mod correlation;
+pub mod ends;
 pub mod factor;
 pub mod form;
 pub mod frame;
+pub mod judge;
 pub mod labels;
 pub mod model;
 pub mod parameters;
@@ -30,17 +32,18 @@ use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::surface::{Cone, Part, SiloSurface, SurfaceTolerance};
 use crate::surface_fit::diagnostics::{WallEvidence, wall_evidence};
-use crate::surface_fit::joint::answer::{JointAnswer, answer, is_ambiguous, judge};
+use crate::surface_fit::joint::answer::{JointAnswer, answer};
 use crate::surface_fit::joint::factor::JointFactor;
 use crate::surface_fit::joint::form::Form;
 use crate::surface_fit::joint::frame::Frame;
+use crate::surface_fit::joint::judge::{LEAST_ARC_ALONE, MOST_BEHIND, is_ambiguous, judge, judge_wall};
 use crate::surface_fit::joint::model::{HOPPER_SLOPE, Inputs, Model};
 use crate::surface_fit::joint::parameters::{INTERCEPT, SLOPE};
 use crate::surface_fit::joint::readings::Readings;
-use crate::surface_fit::joint::search::{Search, search};
+use crate::surface_fit::joint::search::{Search, arc, search, wall_tiles};
 use crate::surface_fit::joint::solve::JointFit;
 use crate::surface_fit::joint::summary::JointSummary;
-use crate::surface_fit::model_selection::{self, Settled};
+use crate::surface_fit::model_selection::{Settled, oriented};
 use crate::surface_fit::outcome::{
     Knowledge, MAX_DIRECTION_STD, MAX_POSITION_STD, Outcome, SurfaceFit, Vessels, check_determined,
 };
@@ -52,6 +55,8 @@ use crate::surface_fit::warm_start::KnownWall;
 
 /// Near enough to a wall found on tiles for what was measured there to hold.
 const SAME: SurfaceTolerance = SurfaceTolerance { tilt: 0.003, shift: 0.01, radius: 0.01, slope: 0.1, apex: 0.1 };
+/// Fewest tiles of a cone that tell whether it is one.
+const LEAST_CONE: f64 = 60.0;
 /// Model error of a cone beyond its cylinder's that is a surface of feed, metres.
 const RIPPLED: f64 = 1e-3;
 
@@ -64,6 +69,9 @@ pub fn fit_inside(
     proposals: &[Fit],
     clock: &mut Clock,
 ) -> Outcome {
+    if know.gravity.is_some_and(|(down, _)| down.z <= 0.0) {
+        return Err(Refusal::AboveHorizon);
+    }
     let scale_is_free = know.radius.is_some() && problem.prior.bias_std[1] > 0.0;
     let readings = Readings::new(problem.patches, &problem.noise, &know.error.bias, problem.pixel);
     let (inputs, form) = (inputs(problem, know, scale_is_free), Form::default());
@@ -78,7 +86,7 @@ pub fn fit_inside(
     let start = near.as_ref().map(|s| placed(&Fit { surface: s.fit.surface.without(s.bare), ..s.fit.clone() }));
     let proposals: Vec<Fit> = proposals.iter().map(placed).collect();
     let bias = know.error.bias;
-    let oriented = model_selection::oriented(problem, &bias);
+    let oriented = oriented(problem, &bias);
     let found = search(&frame, start.as_ref(), &proposals, |surface| other_part(surface, &oriented));
     clock.lap("models");
     judge(&frame, &found)?;
@@ -105,8 +113,6 @@ fn inputs(problem: &Problem, know: &Knowledge, scale_is_free: bool) -> Inputs {
 fn told(problem: &Problem, frame: &Frame, found: &Search, scale: f64, near: Option<&Settled>) -> Outcome {
     let best = found.weighed.first().ok_or(Refusal::NoWall)?;
     let fit = found.fits.get(best.fit).ok_or(Refusal::NoWall)?;
-    let hopper = is_hopper(problem, fit, best.model);
-    let answer = answer(frame, found, hopper, scale).ok_or(Refusal::PoorlyDetermined)?;
     let tiles = tile_fit(fit, best.model);
     let placed = SurfaceEvaluator::new(tiles.surface);
     let with_cone = tiles.surface.cone.is_some();
@@ -117,7 +123,9 @@ fn told(problem: &Problem, frame: &Frame, found: &Search, scale: f64, near: Opti
     let wall: Vec<bool> = (0..fit.sights.len()).map(inside).collect();
     let same = near.filter(|near| found.fits.len() == 1 && near.fit.surface.is_near(&tiles.surface, &SAME));
     let evidence = same.map_or_else(|| wall_evidence(problem.patches, &tiles, &placed, &wall), |near| near.evidence);
-    model_selection::judge(&evidence, true, false)?;
+    let hopper = is_hopper(problem, fit, best.model) && evidence.behind_cone < MOST_BEHIND;
+    judge_wall(fit, &evidence)?;
+    let answer = answer(frame, found, hopper, scale).ok_or(Refusal::PoorlyDetermined)?;
     let heights = fit.sights.iter().zip(&fit.labels.wall).filter(|(_, p)| **p > 0.5).filter_map(|(s, _)| *s);
     let (sum, n) = heights.fold((0.0, 0.0), |(sum, n), s| (sum + s.at.z, n + 1.0));
     let position = MAX_POSITION_STD * fit.state.size();
@@ -135,7 +143,8 @@ fn is_hopper(problem: &Problem, fit: &JointFit, model: Model) -> bool {
         return false;
     }
     let smooth = fit.tau[1] < fit.tau[0] + RIPPLED;
-    smooth && (fit.state.x[SLOPE] < HOPPER_SLOPE || is_covered(problem, &tile_fit(fit, Model::CoaxialCone)))
+    let seen = wall_tiles(fit)[1] > LEAST_CONE && arc(fit, Part::Cone) > LEAST_ARC_ALONE;
+    seen && smooth && (fit.state.x[SLOPE] < HOPPER_SLOPE || is_covered(problem, &tile_fit(fit, Model::CoaxialCone)))
 }
 
 /// The fit as cylinder and coaxial cone; without a cone that is not coaxial.

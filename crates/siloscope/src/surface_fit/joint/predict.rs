@@ -12,7 +12,7 @@
 use crate::geometry::convex_vessel::{Direction, Incidence, Raycaster};
 use crate::geometry::sensor::DepthBias;
 use crate::geometry::surface::Part;
-use crate::surface_fit::joint::form::Form;
+use crate::surface_fit::joint::form::{Form, GROUPS};
 use crate::surface_fit::joint::parameters::{
     BIAS, CAMERA, COMMON, CONE_FORM, CYLINDER_END, CYLINDER_FORM, INTERCEPT, JointState, OBLIQUITY, OFFSET, RADIUS,
     SIZE, SLOPE,
@@ -99,11 +99,25 @@ impl<'a> Predictor<'a> {
     fn bulge(&self, at: &Incidence) -> f64 {
         let mut basis = [0.0; CYLINDER_END - CYLINDER_FORM];
         self.form.evaluate(at.part, self.height(at.part, at.z), at.radial, &mut basis);
-        let coefficients = match at.part {
+        self.coefficients(at.part).iter().zip(basis).map(|(c, b)| c * b).sum()
+    }
+
+    /// The form's value at a tile's place on the wall, by groups.
+    pub fn bulge_by_group(&self, sight: &Sight) -> [f64; GROUPS.len()] {
+        let (mut basis, mut sums) = ([0.0; CYLINDER_END - CYLINDER_FORM], [0.0; GROUPS.len()]);
+        let at = &sight.at;
+        self.form.evaluate(at.part, self.height(at.part, at.z), at.radial, &mut basis);
+        for ((term, coefficient), value) in self.form.of(at.part).iter().zip(self.coefficients(at.part)).zip(basis) {
+            sums[term.group as usize] += coefficient * value;
+        }
+        sums
+    }
+
+    fn coefficients(&self, part: Part) -> &[f64] {
+        match part {
             Part::Cylinder => &self.state.x[CYLINDER_FORM..CYLINDER_END],
             Part::Cone => &self.state.x[CONE_FORM..],
-        };
-        coefficients.iter().zip(basis).map(|(c, b)| c * b).sum()
+        }
     }
 
     /// Depth and place of the wall along a direction, with its form.

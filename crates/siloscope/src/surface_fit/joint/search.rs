@@ -211,14 +211,14 @@ pub fn wall_tiles(fit: &JointFit) -> [f64; 2] {
 
 /// Whether so little of the cylinder is seen that the cone may be all there is.
 fn is_cylinder_weak(fit: &JointFit) -> bool {
-    wall_tiles(fit)[0] < LEAST_CYLINDER * tiles_met(fit) || cylinder_arc(fit) < LEAST_ARC
+    wall_tiles(fit)[0] < LEAST_CYLINDER * tiles_met(fit) || arc(fit, Part::Cylinder) < LEAST_ARC
 }
 
-/// Arc of the cylinder's wall tiles, as a fraction of the circle: 36 sectors with three tiles each, or one of a sketch.
-pub fn cylinder_arc(fit: &JointFit) -> f64 {
+/// Arc of a part's wall tiles, as a fraction of the circle: 36 sectors with three tiles each, or one of a sketch.
+pub fn arc(fit: &JointFit, part: Part) -> f64 {
     let mut sectors = [0u32; 36];
     for (sight, p) in fit.sights.iter().zip(&fit.labels.wall) {
-        if let Some(sight) = sight.filter(|s| s.at.part == Part::Cylinder && *p > 0.5) {
+        if let Some(sight) = sight.filter(|s| s.at.part == part && *p > 0.5) {
             let turn = sight.at.radial[1].atan2(sight.at.radial[0]) / std::f64::consts::TAU + 0.5;
             sectors[((turn * 36.0) as usize).min(35)] += 1;
         }
