@@ -23,6 +23,7 @@ import numpy as np
 
 import silos
 from siloscope.io import writers
+from siloscope.monitor import administration
 from siloscope.simulation import Feed
 
 PATIENCE_S = 60.0
@@ -76,7 +77,7 @@ class Server:
         self.process.wait()
 
     def token(self, role: str, camera: str | None = None) -> str:
-        return monitor(self.data, "token", "--role", role, *(() if camera is None else ("--camera", camera))).strip()
+        return str(administration.token(self.data, None, role, camera, None)["token"])
 
     def ask(
         self, method: str, path: str, body: bytes | None = None, token: str | None = None, **headers: str
@@ -93,6 +94,10 @@ class Server:
 
     def get(self, path: str, token: str | None = None) -> Answer:
         return self.ask("GET", path, token=token)
+
+    def send(self, method: str, path: str, document: Any, token: str | None = None, **headers: str) -> Answer:
+        body = json.dumps(document).encode()
+        return self.ask(method, path, body, token, Content_Type="application/json", **headers)
 
     def post(self, camera: str, body: bytes, token: str, **headers: str) -> Answer:
         headers = {"Content_SHA256": hashlib.sha256(body).hexdigest(), **headers}
@@ -121,6 +126,14 @@ def monitor(data: Path, *arguments: str) -> str:
     """What `siloscope monitor` prints."""
     command = [sys.executable, "-m", "siloscope", "monitor", arguments[0], *arguments[1:], "--data", str(data)]
     return subprocess.run(command, capture_output=True, text=True, check=True).stdout
+
+
+def problem(answer: Answer) -> tuple[int, str]:
+    """Status and slug of a refusal, which has the one shape that all have."""
+    assert answer.headers["content-type"] == "application/problem+json"
+    assert {"type", "title", "status", "detail"} <= set(answer.json)
+    assert answer.json["status"] == answer.status
+    return answer.status, str(answer.json["slug"])
 
 
 def eventually(found: Callable[[], Any], seconds: float = PATIENCE_S) -> Any:

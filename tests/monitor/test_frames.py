@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
-from monitor.servers import Answer, Server, ago, eventually, frame_bytes, serving, true_volume, write_site
+from monitor.servers import Server, ago, eventually, frame_bytes, problem, serving, true_volume, write_site
 
 
 @pytest.fixture(scope="module")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    folder = tmp_path_factory.mktemp("frames")
-    with serving(folder / "data", write_site(folder / "site", cameras=2)) as running:
-        yield running
+def server(shared: Server) -> Server:
+    return shared
 
 
 @pytest.fixture(scope="module")
@@ -48,13 +45,6 @@ def test_the_same_bytes_are_the_same_frame(server: Server, token: str) -> None:
     other = server.post("cam8", frame_bytes(0.4), server.token("camera", "cam8"))
     assert other.status == 201
     assert other.json != first.json
-
-
-def problem(answer: Answer) -> tuple[int, str]:
-    assert answer.headers["content-type"] == "application/problem+json"
-    assert {"type", "title", "status", "detail"} <= set(answer.json)
-    assert answer.json["status"] == answer.status
-    return answer.status, answer.json["slug"]
 
 
 def test_what_is_no_frame_is_refused_by_name(server: Server, token: str) -> None:

@@ -9,6 +9,7 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
+from siloscope import _core
 from siloscope.monitor import worker
 from siloscope.monitor.blobs import Blobs
 from siloscope.monitor.clock import Clock
@@ -118,8 +119,10 @@ class Calibrating:
             if found is None:
                 return False
             places.set_moved(connection, found.camera, None)
-            again = (frames.GATHERING, frames.MEASURED)
-            frames.requeue(connection, found.camera, found.valid_from, found.valid_to, again)
+            run = readings.run_of(
+                connection, _core.__version__, found.sha256, "recomputed", self._clock.now(), "confirmed"
+            )
+            frames.requeue(connection, found.camera, (found.valid_from, found.valid_to), run)
         self._tried.pop(found.camera, None)
         self._wake_measuring()
         return True

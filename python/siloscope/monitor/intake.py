@@ -97,7 +97,7 @@ class Intake:
         """The frame, where it was taken before; raises `Problem` where there is no room for another."""
         with self._store.read() as connection:
             known = frames.find(connection, told.camera, told.sha256) if told.sha256 else None
-            if known is not None:
+            if known is not None and not frames.lost(known):
                 return Taken(known.id, False)
             if frames.waiting(connection) >= self._limits.queue:
                 detail = f"{self._limits.queue} frames wait to be measured; keep the frame and send it later"
@@ -117,7 +117,12 @@ class Intake:
         received = self._clock.now()
         taken = capture(told.captured, told.age, received)
         arrival = frames.Arrival(told.camera, sha256, taken.time, received, taken.clock, part.format, part.size)
-        return Taken(*frames.record(self._store, arrival))
+        place = self._blobs.path(sha256)
+        try:
+            return Taken(*frames.record(self._store, arrival, place.exists))
+        except frames.BytesGone:
+            detail = "the bytes were removed with an older frame of the same content; send it again"
+            raise Problem("unavailable", detail, {"Retry-After": "1"}) from None
 
 
 def full(blobs: Blobs) -> Problem:

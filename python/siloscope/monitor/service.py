@@ -6,16 +6,21 @@ import threading
 from collections.abc import Callable
 from dataclasses import dataclass
 
+from sqlalchemy.exc import OperationalError
+
+from siloscope import _core
 from siloscope.monitor import site
 from siloscope.monitor.alerts import Alerting, add_defaults
 from siloscope.monitor.blobs import Blobs
 from siloscope.monitor.calibrating import Calibrating
 from siloscope.monitor.clock import DAY, Clock, SystemClock
 from siloscope.monitor.intake import Intake
+from siloscope.monitor.lock import Lock
 from siloscope.monitor.measuring import Measuring
 from siloscope.monitor.outbox import Outbox
+from siloscope.monitor.retention import Keeper
 from siloscope.monitor.settings import Settings
-from siloscope.monitor.store import changes, frames, places
+from siloscope.monitor.store import changes, frames, places, readings
 from siloscope.monitor.store.engine import Store, new_id, opened
 from siloscope.monitor.story import Storyteller
 from siloscope.monitor.workers import CalibrationFiles
@@ -43,6 +48,7 @@ class Service:
         settings.data.mkdir(parents=True, exist_ok=True)
         self.settings = settings
         self.clock = clock or SystemClock()
+        self.lock = Lock(settings.data / "lock")
         self.store: Store = opened(settings.url)
         self.blobs = Blobs(settings.data / "frames")
         self.outbox = Outbox(self.store)
@@ -53,6 +59,7 @@ class Service:
         )
         self.calibrating = Calibrating(self.store, self.blobs, settings.limits, self.clock, self.measuring.wake)
         self._stories, self._alerting = Storyteller(self.store), Alerting(self.store, self.outbox)
+        self._keeper = Keeper(self.store, self.blobs, settings.limits, settings.retention, self.clock)
         self._dirty: dict[str, int] = {}
         self._lock, self._stopping = threading.Lock(), threading.Event()
         self._threads: list[threading.Thread] = []
@@ -99,13 +106,34 @@ class Service:
         for thread in self._threads:
             thread.join(5)
         self.store.close()
+        self.lock.release()
 
     def changed(self, silo: str, time: int) -> None:
         """Says that a silo's readings changed at a time: its story is told anew from there."""
-        with self._lock:
-            self._dirty[silo] = min(time, self._dirty.get(silo, time))
+        self._remember({silo: time})
         self.calibrating.wake()
         self.announce()
+
+    def _remember(self, dirty: dict[str, int]) -> None:
+        with self._lock:
+            for silo, time in dirty.items():
+                self._dirty[silo] = min(time, self._dirty.get(silo, time))
+
+    def recompute(self, silo: str, who: str) -> tuple[int, int]:
+        """Queues a silo's frames that are still there as a new run; the run, and how many frames."""
+        with self.store.write() as connection:
+            now = self.clock.now()
+            run = readings.run_of(connection, _core.__version__, silo, "recomputed", now, f"asked for by {who}")
+            cameras = [row for row in places.listed(connection, "camera") if row.silo == silo]
+            count = sum(frames.requeue(connection, row.id, (0, None), run) for row in cameras)
+        self.measuring.wake()
+        return run, count
+
+    def has_room(self) -> bool:
+        """Whether frames are taken."""
+        free, total = self.blobs.free()
+        limits = self.settings.limits
+        return free >= min(limits.reserve, int(limits.reserve_fraction * total))
 
     def announce(self) -> None:
         """Says that the log of changes has grown."""
@@ -113,10 +141,16 @@ class Service:
             listener()
 
     def _run(self) -> None:
-        ticked = 0
+        ticked = kept = 0
         while not self._stopping.wait(BEAT_S):
-            self.beat()
             now = self.clock.now()
+            try:
+                self.beat()
+                if now - kept >= self.settings.retention.every or not self.has_room():
+                    kept = now
+                    self._keeper.keep()
+            except OperationalError:
+                continue  # a full disk or a busy database: the next beat tries again
             if now - ticked >= self.settings.tick:
                 ticked = now
                 self.tick()
@@ -125,11 +159,17 @@ class Service:
         """Stories and rules of the silos whose readings changed."""
         with self._lock:
             dirty, self._dirty = self._dirty, {}
-        for silo, since in dirty.items():
-            now = self.clock.now()
-            self._stories.tell(silo, since, now)
-            self._alerting.look(silo, now)
-        if dirty:
+        told = False
+        while dirty:
+            silo, since = dirty.popitem()
+            try:
+                self._stories.tell(silo, since, self.clock.now())
+                self._alerting.look(silo, self.clock.now())
+            except OperationalError:
+                self._remember({**dirty, silo: since})
+                raise
+            told = True
+        if told:
             self.announce()
         self.outbox.deliver(self.clock.now())
 

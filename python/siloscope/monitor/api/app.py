@@ -15,16 +15,34 @@ from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
 
 from siloscope import _core
-from siloscope.monitor.api import alerts, frames, health, models, readings, silos, stream
+from siloscope.monitor.api import (
+    alerts,
+    calibrations,
+    frames,
+    health,
+    models,
+    people,
+    readings,
+    rules,
+    session,
+    settings,
+    silos,
+    stream,
+    tickets,
+)
 from siloscope.monitor.intake import full, is_full
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.service import Service
+from siloscope.monitor.throttle import Throttle
 
 PREFIX = "/api/v1"
 
 PAGE = Path(__file__).parents[1] / "page"
 
-ROUTERS = (silos.router, readings.router, frames.router, alerts.router, stream.router, health.router)
+ROUTERS = (
+    *(silos.router, readings.router, frames.router, alerts.router, rules.router, calibrations.router, tickets.router),
+    *(settings.router, session.router, people.router, stream.router, health.router),
+)
 
 HEADERS = {
     "Content-Security-Policy": "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; "
@@ -58,6 +76,7 @@ def create_app(service: Service) -> FastAPI:
         lifespan=lifespan,
     )
     app.state.service = service
+    app.state.throttle = Throttle()
     for router in ROUTERS:
         app.include_router(router, prefix=PREFIX)
     app.include_router(health.outside)

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Annotated, Any
+from urllib.parse import urlsplit
 
 from fastapi import Depends, Query, Request
 from sqlalchemy import Connection
@@ -19,6 +20,8 @@ from siloscope.monitor.service import Service
 from siloscope.monitor.store import people, places
 
 COOKIE = "siloscope_session"
+
+SAFE = ("GET", "HEAD", "OPTIONS")
 
 LOCAL_HOSTS = ("127.0.0.1", "localhost", "[::1]", "::1", "testserver")
 
@@ -52,14 +55,31 @@ def person_of(request: Request, service: ServiceOf, connection: Reading) -> Pers
         return person
     cookie = request.cookies.get(COOKIE)
     person = access.by_session(connection, cookie, service.clock.now()) if cookie else None
+    if person is None and people.count_users(connection) == 0 and is_local(request):
+        person = LOCAL
     if person is not None:
+        if request.method not in SAFE:
+            check_origin(request)
         return person
-    if people.count_users(connection) == 0 and is_local(request):
-        return LOCAL
     raise unauthorized("send a token as 'Authorization: Bearer …', or sign in")
 
 
 PersonOf = Annotated[Person, Depends(person_of)]
+
+
+def check_origin(request: Request) -> None:
+    """Raises `Problem` for a write that a page of another site makes in the browser of who is signed in here."""
+    site = request.headers.get("sec-fetch-site")
+    origin = request.headers.get("origin")
+    hosts = (request.headers.get("host"), request.headers.get("x-forwarded-host"))
+    other = origin is not None and urlsplit(origin).netloc not in hosts
+    if other or site not in (None, "same-origin", "none"):
+        raise Problem("cross-origin", "write requests are taken from the service's own page, or with a token")
+
+
+def address_of(request: Request) -> str:
+    """Where a request comes from, for the audit log."""
+    return request.client.host if request.client else "unknown"
 
 
 def unauthorized(detail: str) -> Problem:

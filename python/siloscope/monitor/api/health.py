@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from fastapi import APIRouter
-from fastapi.responses import JSONResponse
+from fastapi.responses import JSONResponse, Response
 from sqlalchemy.exc import SQLAlchemyError
 
 from siloscope import _core
 from siloscope.monitor.api import models, views
 from siloscope.monitor.api.context import PersonOf, Reading, ServiceOf, refusals
+from siloscope.monitor.problems import Problem
+from siloscope.monitor.publish import metrics
 from siloscope.monitor.store import changes, frames, people, places
 
 router = APIRouter(tags=["service"])
@@ -36,6 +38,16 @@ def readyz(service: ServiceOf) -> JSONResponse:
         detail, ready = {"database": type(error).__name__}, False
     health = models.Health(status="ok" if ready else "not-ready", version=_core.__version__, detail=detail)
     return JSONResponse(health.model_dump(), 200 if ready else 503)
+
+
+@outside.get(
+    "/metrics", response_class=Response, responses={200: {"content": {"text/plain": {}}}, **refusals("forbidden")}
+)
+def get_metrics(person: PersonOf, service: ServiceOf) -> Response:
+    """The state for Prometheus; a token of the role metrics or read opens it."""
+    if not person.metrics and not person.may("viewer"):
+        raise Problem("forbidden", "this needs a token of the role metrics")
+    return Response(metrics.text(service), media_type=metrics.CONTENT_TYPE)
 
 
 @router.get("/site", response_model=models.Site, responses=refusals())

@@ -122,7 +122,7 @@ def _bucket(row: Any, since: int, width: int) -> models.Bucket:
     return models.Bucket(
         time=views.at(begin),
         end=views.at(begin + width),
-        count=row.count,
+        count=row.number,
         volume_m3=row.volume,
         volume_std_m3=row.volume_std,
         volume_min_m3=row.volume_min,

@@ -104,7 +104,7 @@ def listed(
 
 def firing(connection: Connection) -> Sequence[Record]:
     """Number of unresolved alerts by silo and kind."""
-    wanted = select(alert.c.silo, alert.c.kind, func.count().label("count")).where(alert.c.resolved.is_(None))
+    wanted = select(alert.c.silo, alert.c.kind, func.count().label("number")).where(alert.c.resolved.is_(None))
     return connection.execute(wanted.group_by(alert.c.silo, alert.c.kind)).all()
 
 

@@ -27,6 +27,9 @@ MIGRATIONS = Path(__file__).parent / "migrations"
 BUSY_MS = 30_000
 """How long a connection waits for another process's write, ms."""
 
+BLOBS = 8480
+"""PostgreSQL's advisory lock of the frames' bytes."""
+
 WRITE = "siloscope_write"
 """Execution option of connections that write."""
 
@@ -62,6 +65,15 @@ class Store:
             with connection.begin():
                 yield connection
 
+    def while_blobs_stay(self, connection: Connection, *, removing: bool = False) -> None:
+        """Holds a lock to the transaction's end: bytes are removed only while no frame is being recorded.
+
+        SQLite has one writer anyway.
+        """
+        if not self.is_sqlite:
+            kind = "" if removing else "_shared"
+            connection.execute(text(f"SELECT pg_advisory_xact_lock{kind}({BLOBS})"))
+
     def insert_new(self, connection: Connection, table: Table, row: dict[str, Any]) -> bool:
         """Inserts a row unless one with its unique key is there; whether it was inserted."""
         dialect: Any = sqlite if self.is_sqlite else postgresql
@@ -87,8 +99,7 @@ def opened(url: str) -> Store:
         refuse_network(Path(url.removeprefix("sqlite:///")).parent)
     try:
         store = Store(url)
-        with store.read() as connection:
-            found = MigrationContext.configure(connection).get_current_revision()
+        found = revision_of(store)
     except (ArgumentError, ImportError) as error:
         raise UsageError(f"--database {url}: {error}; give a URL such as postgresql+psycopg://user@host/name") from None
     except OperationalError as error:
@@ -101,8 +112,27 @@ def opened(url: str) -> Store:
             f"to '{script.get_current_head()}'; install the newer program, or restore a backup of before"
         )
     if found != script.get_current_head():
+        if found is not None:
+            _keep_before(store, found)
         migrate(store)
     return store
+
+
+def _keep_before(store: Store, revision: str) -> None:
+    """Keeps an SQLite file as it is before its schema changes: going back is restoring it."""
+    if not store.is_sqlite:
+        return
+    path = Path(store.url.removeprefix("sqlite:///"))
+    kept = path.with_name(f"{path.stem}.before-{revision}.db")
+    if not kept.exists():
+        with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
+            connection.exec_driver_sql("VACUUM INTO ?", (str(kept),))
+
+
+def revision_of(store: Store) -> str | None:
+    """The schema of a database."""
+    with store.read() as connection:
+        return MigrationContext.configure(connection).get_current_revision()
 
 
 def migrate(store: Store, to: str = "head") -> None:

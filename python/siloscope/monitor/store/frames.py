@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,10 @@ from siloscope.monitor.store.schema import camera, frame, reading
 QUEUED, MEASURING, MEASURED, GATHERING, FAILED = "queued", "measuring", "measured", "gathering", "failed"
 STATES = (QUEUED, MEASURING, MEASURED, GATHERING, FAILED)
 """A frame waits, is in a worker, has a reading (or a refusal), waits for a calibration, or can't be used."""
+
+
+class BytesGone(Exception):
+    """The bytes were removed between their arrival and their frame's; the sender sends them again."""
 
 
 @dataclass(frozen=True)
@@ -43,16 +47,32 @@ def get(connection: Connection, frame_id: str) -> Record | None:
     return connection.execute(wanted).one_or_none()
 
 
-def record(store: Store, arrival: Arrival) -> tuple[str, bool]:
-    """Adds a frame to the queue, durably; its id, and whether it is new."""
+def record(store: Store, arrival: Arrival, there: Callable[[], bool]) -> tuple[str, bool]:
+    """Adds a frame to the queue, durably; its id, and whether it is new.
+
+    A frame whose bytes were lost is queued again with the new ones. Raises `BytesGone` unless the bytes are `there`
+    while nothing can remove them.
+    """
     with store.write() as connection:
+        store.while_blobs_stay(connection)
+        if not there():
+            raise BytesGone
         frame_id = new_id()
         row = {name: getattr(arrival, name) for name in Arrival.__dataclass_fields__}
         row |= {"id": frame_id, "kept": True, "state": QUEUED, "attempts": 0, "not_before": 0}
         if store.insert_new(connection, frame, row):
             return frame_id, True
         found = find(connection, arrival.camera, arrival.sha256)
+        if found is not None and lost(found):
+            again = {"kept": True, "state": QUEUED, "attempts": 0, "not_before": 0, "error": None}
+            connection.execute(update(frame).where(frame.c.id == found.id).values(**again))
+            return str(found.id), True
         return str(found.id if found else frame_id), False
+
+
+def lost(row: Record) -> bool:
+    """Whether a frame's bytes were lost before it was measured."""
+    return not row.kept and row.state == FAILED
 
 
 def waiting(connection: Connection) -> int:
@@ -92,12 +112,14 @@ def requeue_interrupted(store: Store) -> int:
         return connection.execute(back).rowcount
 
 
-def requeue(connection: Connection, camera_id: str, since: int, until: int | None, states: Sequence[str]) -> int:
-    """Queues a camera's kept frames of a time again."""
+def requeue(connection: Connection, camera_id: str, span: tuple[int, int | None], run: int) -> int:
+    """Queues a camera's kept frames of a time again, as part of a run; how many."""
+    since, until = span
+    states = (GATHERING, MEASURED, FAILED)
     chosen = [frame.c.camera == camera_id, frame.c.captured >= since, frame.c.kept, frame.c.state.in_(states)]
     if until is not None:
         chosen.append(frame.c.captured < until)
-    back = update(frame).where(*chosen).values(state=QUEUED, attempts=0, not_before=0, error=None)
+    back = update(frame).where(*chosen).values(state=QUEUED, attempts=0, not_before=0, error=None, run=run)
     return connection.execute(back).rowcount
 
 

@@ -141,3 +141,20 @@ def audited(connection: Connection, before: int | None, count: int) -> Sequence[
     if before is not None:
         wanted = wanted.where(audit.c.id < before)
     return connection.execute(wanted.order_by(audit.c.id.desc()).limit(count)).all()
+
+
+def has_admin(connection: Connection) -> bool:
+    """Whether somebody that can sign in administers the whole site."""
+    chosen = [grant.c.role == "admin", grant.c.place.is_(None), user.c.disabled.is_(None), user.c.password.is_not(None)]
+    wanted = select(func.count()).select_from(grant.join(user, user.c.id == grant.c.user)).where(*chosen)
+    return connection.execute(wanted).scalar_one() > 0
+
+
+def name_of(connection: Connection, key: str) -> str:
+    """A user's name."""
+    return str(connection.execute(select(user.c.name).where(user.c.id == key)).scalar_one())
+
+
+def prune(connection: Connection, before: int) -> int:
+    """Forgets lines of the audit log from before a time."""
+    return connection.execute(delete(audit).where(audit.c.time < before)).rowcount

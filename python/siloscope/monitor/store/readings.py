@@ -69,7 +69,7 @@ def buckets(connection: Connection, silo: str, since: int, until: int, width: in
     chosen = [*current(silo, Span(since, until)), reading.c.status == "ok"]
     columns = [
         number.label("bucket"),
-        func.count().label("count"),
+        func.count().label("number"),
         *(func.avg(reading.c[name]).label(name) for name in ("volume", "volume_std", "fill", "mass")),
         func.min(reading.c.volume).label("volume_min"),
         func.max(reading.c.volume).label("volume_max"),
