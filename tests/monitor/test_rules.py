@@ -13,6 +13,8 @@ from hypothesis import strategies as st
 from siloscope.monitor import alerts, rules
 from siloscope.monitor.clock import DAY, HOUR, MINUTE
 from siloscope.monitor.rules import FIRING, OK, PENDING, Rule, State, Value
+from siloscope.monitor.store import alerts as stored
+from siloscope.monitor.store import places
 
 LOW = Rule("low", "low", 0.2, 0.25, 0)
 FULL = Rule("overfill", "overfill", 0.95, 0.92, 0)
@@ -137,15 +139,15 @@ def test_the_nearest_rule_of_a_kind_is_in_force(monkeypatch: pytest.MonkeyPatch)
         return SimpleNamespace(id=key, kind="low", silo=silo, place=place, enabled=enabled)
 
     site, farm, own = row("site"), row("farm", place="farm"), row("own", silo="silo7")
-    monkeypatch.setattr(alerts.places, "above", lambda _c, _p: ["barn", "farm"])
+    monkeypatch.setattr(places, "above", lambda _c, _p: ["barn", "farm"])
     silo = SimpleNamespace(id="silo7", place="barn")
     for known, best in (
         ([site, farm, own], ["own"]),
         ([farm, site], ["farm"]),
         ([site, row("x", place="y")], ["site"]),
     ):
-        monkeypatch.setattr(alerts.alerts, "rules", lambda _c, known=known: known)
+        monkeypatch.setattr(stored, "rules", lambda _c, known=known: known)
         assert [one.id for one in alerts.in_force(None, silo)] == best
     off = [site, row("off", silo="silo7", enabled=False)]
-    monkeypatch.setattr(alerts.alerts, "rules", lambda _c: off)
+    monkeypatch.setattr(stored, "rules", lambda _c: off)
     assert alerts.in_force(None, silo) == []
