@@ -65,6 +65,7 @@ def _settings(data: Path, site: Path | None, host: str, port: int, database: str
 def _run(settings: Settings, demo: bool, as_json: bool) -> int:
     from siloscope.monitor import server
     from siloscope.monitor.access import first_link
+    from siloscope.monitor.publish.attach import attach
     from siloscope.monitor.service import Service
 
     service = Service(settings)
@@ -78,6 +79,7 @@ def _run(settings: Settings, demo: bool, as_json: bool) -> int:
             f"--bind {settings.host}: there is no user yet, so only this machine may reach it; "
             "make one with `siloscope monitor user NAME`, or start with --bind 127.0.0.1:8480 and use the link"
         )
+    attach(service)
     sock = server.listening(settings.host, settings.port)
     root = f"http://{_shown(settings.host)}:{sock.getsockname()[1]}"
     if as_json:

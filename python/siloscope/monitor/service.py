@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 from sqlalchemy.exc import OperationalError
 
@@ -18,6 +19,7 @@ from siloscope.monitor.intake import Intake
 from siloscope.monitor.lock import Lock
 from siloscope.monitor.measuring import Measuring
 from siloscope.monitor.outbox import Outbox
+from siloscope.monitor.outlets import Outlets
 from siloscope.monitor.retention import Keeper
 from siloscope.monitor.settings import Settings
 from siloscope.monitor.store import changes, frames, places, readings
@@ -39,6 +41,16 @@ class Swept:
     """Frames that were in a worker."""
     damaged: int
     """Frames of the last day whose bytes are gone or wrong."""
+
+
+class Part(Protocol):
+    """Something that runs while the service does."""
+
+    def start(self) -> None:
+        """Begins."""
+
+    def stop(self) -> None:
+        """Ends."""
 
 
 class Service:
@@ -63,6 +75,9 @@ class Service:
         self._dirty: dict[str, int] = {}
         self._lock, self._stopping = threading.Lock(), threading.Event()
         self._threads: list[threading.Thread] = []
+        self.parts: list[Part] = []
+        """What else runs, such as the publishers."""
+        self.outlets = Outlets()
         self.listeners: list[Callable[[], None]] = []
         """Called when something changed, from any thread."""
         self.started = self.clock.now()
@@ -76,7 +91,9 @@ class Service:
                 places.set_fact(connection, "box", new_id())
             add_defaults(connection, now)
             if self.settings.site is not None:
-                site.apply(connection, site.read(self.settings.site), self.settings.site, now)
+                found = site.read(self.settings.site)
+                site.apply(connection, found, self.settings.site, now)
+                self.outlets = found
         return swept
 
     def _check_recent(self, now: int) -> int:
@@ -97,9 +114,13 @@ class Service:
         thread = threading.Thread(target=self._run, name="beat", daemon=True)
         thread.start()
         self._threads.append(thread)
+        for part in self.parts:
+            part.start()
 
     def stop(self) -> None:
         """Ends them all."""
+        for part in self.parts:
+            part.stop()
         self._stopping.set()
         self.measuring.stop()
         self.calibrating.stop()
@@ -171,7 +192,6 @@ class Service:
             told = True
         if told:
             self.announce()
-        self.outbox.deliver(self.clock.now())
 
     def tick(self) -> None:
         """Rules of all silos, for what has not come."""

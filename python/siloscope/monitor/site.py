@@ -13,6 +13,7 @@ from sqlalchemy import Connection
 
 from siloscope.errors import InputError
 from siloscope.monitor import rules
+from siloscope.monitor.outlets import Outlets
 from siloscope.monitor.store import alerts, places
 from siloscope.schema import files
 from siloscope.schema.fields import Index, NotNegative, Number
@@ -122,7 +123,7 @@ class SiteEntry(StrictDocument):
     zone: str | None = None
 
 
-class SiteFile(StrictDocument):
+class SiteFile(Outlets):
     """The whole file."""
 
     site: SiteEntry = Field(default_factory=SiteEntry)
@@ -170,7 +171,7 @@ class _Applied:
         for silo in found.silo:
             self._calibration(silo)
         for rule in found.rule:
-            self._rule(rule)
+            self._rule(rule, found.channels)
 
     def _place(self, told: PlaceEntry) -> None:
         self._must_be("place", told.parent, f"place '{told.id}'")
@@ -227,9 +228,15 @@ class _Applied:
                 frames = len(document.get("frames", ()))
                 places.add_calibration(self._connection, told.id, camera.id, document, self._now, frames=frames, **row)
 
-    def _rule(self, told: RuleEntry) -> None:
+    def _rule(self, told: RuleEntry, channels: set[str]) -> None:
         self._must_be("place", told.place, f"rule '{told.id}'")
         self._must_be("silo", told.silo, f"rule '{told.id}'")
+        for channel in told.channels:
+            if channel not in channels:
+                raise InputError(
+                    f"{self._path}: rule '{told.id}' names the channel '{channel}', which is not there; "
+                    f"known are {', '.join(sorted(channels))}"
+                )
         defaults = rules.DEFAULTS[told.kind]
         level = defaults.level if told.level is None else told.level
         values = {
