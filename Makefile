@@ -119,7 +119,12 @@ format: $(VENV)/.installed ## formats all code
 clean: ## removes what was built, but not .venv
 	rm -rf target build dist site demo
 
-.PHONY: results peers
+.PHONY: results peers services
+
+SERVICES := mosquitto mbpoll prometheus nginx-light
+
+services: ## installs the servers and clients that the service is tested with (Debian, as root); without them those tests are skipped
+	apt-get install -y --no-install-recommends $(SERVICES)
 
 results: build ## repeats the paper's evaluation and writes docs/results.md
 	$(BIN)/siloscope reproduce all --out docs

@@ -20,6 +20,7 @@ from aiosmtpd.controller import Controller
 from aiosmtpd.smtp import AuthResult, LoginPassword
 
 from monitor import farm
+from monitor.servers import Server
 from siloscope.errors import InputError
 from siloscope.monitor.clock import DAY, HOUR, SECOND, SetClock
 from siloscope.monitor.outbox import GIVE_UP, LAST_RETRY, NotDelivered, Outbox, retry
@@ -193,7 +194,7 @@ def test_an_unknown_channel_is_told_at_the_start(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="channel 'erb'"):
         farm.make(tmp_path, farm.rule("erb"))
     with pytest.raises(InputError, match="secret"):
-        farm.make(tmp_path, '[[webhook]]\nid = "erp"\nurl = "https://example.org"\nsecret_file = "missing"\n')
+        farm.make(tmp_path / "other", '[[webhook]]\nid = "erp"\nurl = "https://example.org"\nsecret_file = "missing"\n')
 
 
 class Mailbox:
@@ -290,3 +291,9 @@ def test_threads_deliver_by_themselves(tmp_path: Path) -> None:
         for part in service.parts:
             part.stop()
         assert len(server.came) == 1
+
+
+def test_deliveries_are_told_to_who_may_see_them(shared: Server) -> None:
+    assert shared.get("/api/v1/deliveries?state=failed").json == {"items": [], "next": None}
+    assert shared.ask("POST", "/api/v1/deliveries/1:retry", b"").status == 404
+    assert shared.get("/api/v1/deliveries", shared.token("read")).status == 403

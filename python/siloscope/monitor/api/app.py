@@ -18,6 +18,7 @@ from siloscope import _core
 from siloscope.monitor.api import (
     alerts,
     calibrations,
+    deliveries,
     frames,
     health,
     models,
@@ -41,7 +42,7 @@ PAGE = Path(__file__).parents[1] / "page"
 
 ROUTERS = (
     *(silos.router, readings.router, frames.router, alerts.router, rules.router, calibrations.router, tickets.router),
-    *(settings.router, session.router, people.router, stream.router, health.router),
+    *(settings.router, session.router, people.router, deliveries.router, stream.router, health.router),
 )
 
 HEADERS = {

@@ -77,6 +77,10 @@ class Collector:
         for channel, number in deliveries.pending(connection).items():
             pending.add_metric([channel], number)
         yield pending
+        given_up = GaugeMetricFamily("siloscope_outbox_failed", "Things that are tried no more.", labels=["channel"])
+        for channel, number in deliveries.given_up(connection).items():
+            given_up.add_metric([channel], number)
+        yield given_up
         firing = GaugeMetricFamily("siloscope_alerts_firing", "Alerts that are on.", labels=["silo", "kind"])
         for row in alerts.firing(connection):
             firing.add_metric([row.silo, row.kind], row.number)

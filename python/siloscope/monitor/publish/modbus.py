@@ -13,13 +13,13 @@ import socket
 import struct
 import time
 
-from siloscope import reasons
 from siloscope.errors import UsageError
 from siloscope.monitor.clock import SECOND
 from siloscope.monitor.outlets import ModbusEntry
 from siloscope.monitor.publish.asynchronous import AsyncPart
 from siloscope.monitor.publish.image import STATUSES, Image, images
 from siloscope.monitor.service import Service
+from siloscope.reasons import CONTENT_REMARKS
 
 SWAPPED = 1000
 """Where the registers with swapped words begin."""
@@ -38,7 +38,7 @@ IDLE_S, KEPT_S = 120.0, 1.0
 UNKNOWN = 0xFFFF_FFFF
 """Of an unsigned number."""
 
-QUALITY = tuple(reasons.CONTENT_REMARKS)[:16]
+QUALITY = tuple(CONTENT_REMARKS)[:16]
 """Remarks by the bit of register 129, the lowest first."""
 
 MASS = {"kg": 1.0, "t": 1e-3, "lb": 1.0 / 0.45359237}

@@ -1,6 +1,6 @@
 """What the API answers. Times are RFC 3339 in UTC, numbers in SI units with the unit in the name, deviations beside."""
 
-from siloscope.monitor.api.models.alerts import Acknowledgement, Alert
+from siloscope.monitor.api.models.alerts import Acknowledgement, Alert, Delivery
 from siloscope.monitor.api.models.base import Clock, Item, Model, Page, Problem
 from siloscope.monitor.api.models.contents import (
     Attempt,
@@ -58,6 +58,7 @@ __all__ = [
     "CameraState",
     "Change",
     "Clock",
+    "Delivery",
     "Event",
     "Forecast",
     "Frame",

@@ -36,3 +36,18 @@ class Acknowledgement(BaseModel):
 
     model_config = ConfigDict(extra="forbid")
     note: str | None = Field(None, max_length=2000)
+
+
+class Delivery(Model):
+    """An alert on its way to a channel."""
+
+    id: int
+    channel: str
+    key: str = Field(description="The same for every attempt.")
+    alert: str | None
+    state: Literal["pending", "failed", "delivered"]
+    created: datetime
+    attempts: int
+    next: datetime | None = Field(description="When it is tried again.")
+    delivered: datetime | None
+    error: str | None = Field(description="Of the last attempt.")
