@@ -14,6 +14,8 @@ use crate::surface_fit::joint::solve::JointFit;
 
 /// Most of the tiles' model error that is a wall's, as a fraction of the radius.
 const MOST_TAU: f64 = 0.012;
+/// The same for what its tiles have in common: model error times the root of the correlation factor.
+const MOST_IN_COMMON: f64 = 0.015;
 /// Largest correlation factor of a wall.
 const MOST_CORRELATION: f64 = 45.0;
 /// Fewer tiles of the cylinder than these don't fix where it is.
@@ -50,20 +52,21 @@ pub fn judge(frame: &Frame, search: &Search) -> Result<(), Refusal> {
     let fit = search.fits.get(best.fit).ok_or(Refusal::NoWall)?;
     let [cylinder, cone] = wall_tiles(fit);
     let all = tiles_met(fit).max(1.0);
-    let weak = cylinder < WEAK_CYLINDER * all && cone > cylinder;
+    let tied = best.model != Model::FreeCone && cone > cylinder; // else the axis is the cylinder's alone
+    let weak = tied && cylinder < WEAK_CYLINDER * all;
     let sound = fit.state.x[SLOPE] < HOPPER_SLOPE && is_round(fit);
-    if best.model.is_cone_alone() || cylinder < LEAST_CYLINDER || weak && !sound {
-        return match frame.inputs.gravity {
-            Some(_) if best.model.is_cone_alone() && agrees_with_gravity(frame, fit, best.model) => Ok(()),
-            _ => Err(Refusal::ConeAlone),
-        };
+    let agrees = frame.inputs.gravity.is_some() && agrees_with_gravity(frame, fit, best.model);
+    let leads = best.model.is_cone_alone() || cylinder < LEAST_CYLINDER || weak && !sound;
+    if leads && !agrees {
+        return Err(Refusal::ConeAlone);
     }
     let size = fit.state.size();
-    let main = usize::from(cylinder < cone);
-    if fit.tau[0] > MOST_TAU * size || fit.correlation[main] > MOST_CORRELATION {
+    let lead = leading_part(fit, best.model);
+    let in_common = fit.tau[lead] * fit.correlation[lead].sqrt();
+    if fit.tau[0] > MOST_TAU * size || in_common > MOST_IN_COMMON * size || fit.correlation[lead] > MOST_CORRELATION {
         return Err(Refusal::NoWall);
     }
-    if frame.inputs.gravity.is_some() && !agrees_with_gravity(frame, fit, best.model) {
+    if frame.inputs.gravity.is_some() && !agrees {
         return Err(Refusal::GravityContradicts);
     }
     if is_deformed(frame, fit) {
@@ -73,6 +76,21 @@ pub fn judge(frame: &Frame, search: &Search) -> Result<(), Refusal> {
         return Err(Refusal::PoorlyDetermined);
     }
     judge_ends(frame, fit)
+}
+
+/// The part that leads the axis, by the weight of its tiles: 0 for the cylinder, 1 for a cone that is tied to it.
+fn leading_part(fit: &JointFit, model: Model) -> usize {
+    if model == Model::FreeCone {
+        return 0;
+    }
+    let mut weights = [0.0; 2];
+    for ((sight, wall), variance) in fit.sights.iter().zip(&fit.labels.wall).zip(&fit.labels.variance) {
+        if let Some(sight) = sight {
+            let part = usize::from(sight.at.part == Part::Cone);
+            weights[part] += wall / (variance * fit.correlation[part]);
+        }
+    }
+    usize::from(weights[1] > weights[0])
 }
 
 /// Whether the form that is seen goes beyond its caps: it is a deposit or another shape.

@@ -2,6 +2,7 @@
 
 use crate::SiloPose;
 use crate::geometry::sensor::DepthBias;
+use crate::geometry::surface::FEED_SLOPE;
 use crate::surface_fit::joint::form::{Form, GROUPS, Group};
 use crate::surface_fit::joint::parameters::{
     BIAS, CAMERA, CONE_FORM, CYLINDER_FORM, INTERCEPT, JointState, OBLIQUITY, OFFSET, RADIUS, SIZE, SLOPE,
@@ -33,11 +34,16 @@ impl Model {
     pub const ALL: [Self; 6] =
         [Self::Cylinder, Self::CoaxialCone, Self::ObliqueCone, Self::FreeCone, Self::ConeAlone, Self::ObliqueConeAlone];
 
-    /// Models that differ by their priors alone, for a state with these parts.
-    pub fn of_parts(cylinder: bool, cone: bool) -> &'static [Self] {
-        match (cylinder, cone) {
+    /// Models that differ by their priors alone, for the parts of a state.
+    ///
+    /// A cone as flat as feed lies is a surface of its own: nothing ties it to the cylinder, and alone it is no vessel.
+    pub fn of(state: &JointState) -> &'static [Self] {
+        let flat = state.has_cone && state.x[SLOPE] > FEED_SLOPE;
+        match (state.has_cylinder, state.has_cone) {
+            (true, true) if flat => &[Self::FreeCone],
             (true, true) => &[Self::CoaxialCone, Self::ObliqueCone, Self::FreeCone],
             (true, false) => &[Self::Cylinder],
+            _ if flat => &[],
             _ => &[Self::ConeAlone, Self::ObliqueConeAlone],
         }
     }
@@ -69,15 +75,24 @@ impl Model {
         matches!(self, Self::ConeAlone | Self::ObliqueConeAlone)
     }
 
-    /// Standard deviations of the cone's offset (as a fraction of the radius) and obliquity.
-    fn cone_widths(self) -> [f64; 2] {
+    /// Standard deviations of the cone's offset (as a fraction of the radius) and obliquity, with a building tolerance.
+    fn cone_widths(self, tolerance: f64) -> [f64; 2] {
         match self {
             Self::Cylinder => [0.0, 0.0],
-            Self::CoaxialCone => [TOLERANCE, TOLERANCE],
-            Self::ObliqueCone => [TOLERANCE, OBLIQUE],
+            Self::CoaxialCone => [tolerance, tolerance],
+            Self::ObliqueCone => [tolerance, OBLIQUE],
             Self::FreeCone => [ECCENTRIC, OBLIQUE],
-            Self::ConeAlone => [0.0, TOLERANCE],
+            Self::ConeAlone => [0.0, tolerance],
             Self::ObliqueConeAlone => [0.0, OBLIQUE],
+        }
+    }
+
+    /// Puts the cone's widths into a prior; of a cone as good as ideal where its part of the vessel is `ideal`.
+    pub fn place_cone(self, prior: &mut Prior, size: f64, ideal: bool) {
+        let [offset, obliquity] = self.cone_widths(if ideal { IDEAL * TOLERANCE } else { TOLERANCE });
+        for k in 0..2 {
+            (prior.mean[OFFSET + k], prior.std[OFFSET + k]) = (0.0, offset * size);
+            (prior.mean[OBLIQUITY + k], prior.std[OBLIQUITY + k]) = (0.0, obliquity);
         }
     }
 }
@@ -122,7 +137,7 @@ pub struct Amplitudes {
 
 /// Pseudo-coefficients of an amplitude's prior: its first value counts as so many.
 pub const PSEUDO_COEFFICIENTS: f64 = 1.0;
-/// Form of a wall that is as good as ideal, over the first amplitudes.
+/// Form of a wall that is as good as ideal, over the first amplitudes; and its cone's tolerance over the usual one.
 const IDEAL: f64 = 0.1;
 /// The same for the intrinsics' common factor.
 const CAMERA_PSEUDO: f64 = 4.0;
@@ -205,11 +220,7 @@ pub fn prior(model: Model, start: &JointState, inputs: &Inputs, form: &Form, amp
     if start.has_cone {
         (p.mean[SLOPE], p.std[SLOPE]) = (SLOPES[0], SLOPES[1]);
         p.std[INTERCEPT] = ANY_INTERCEPT * size;
-        let [offset, obliquity] = model.cone_widths();
-        for k in 0..2 {
-            (p.mean[OFFSET + k], p.std[OFFSET + k]) = (0.0, offset * size);
-            (p.mean[OBLIQUITY + k], p.std[OBLIQUITY + k]) = (0.0, obliquity);
-        }
+        model.place_cone(&mut p, size, false);
     }
     let bias = [inputs.bias.offset, inputs.bias.scale, inputs.bias.quadratic];
     p.mean[BIAS..BIAS + 3].copy_from_slice(&bias);

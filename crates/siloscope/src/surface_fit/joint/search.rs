@@ -82,8 +82,8 @@ pub fn search(
     let mut fits = Vec::new();
     if let Some(fit) = near {
         let state = state_of(fit);
-        let model = default_model(&state);
-        fits.extend(JointFit::start(model, state, fit.misfit.max(2e-4)).run(frame, &NEAR));
+        let start = Model::of(&state).first().map(|model| JointFit::start(*model, state, fit.misfit.max(2e-4)));
+        fits.extend(start.and_then(|start| start.run(frame, &NEAR)));
         let weighed = weigh(frame, &fits);
         if fits.first().is_some_and(|fit| is_certain(frame, fit, &weighed)) {
             return Search { fits, weighed };
@@ -110,7 +110,8 @@ pub fn search(
     let weak = both.iter().all(is_cylinder_weak);
     let (score, other) = (best_score(&both), best_score(&alone));
     if weak {
-        let cone_alone = cones.into_iter().filter_map(|state| anneal(frame, Model::ConeAlone, state)).collect();
+        let cone_alone = cones.into_iter().filter_map(|state| anneal(frame, Model::ConeAlone, state));
+        let cone_alone = cone_alone.filter(|fit| !Model::of(&fit.state).is_empty()).collect();
         fits.extend(finished(frame, cone_alone));
     }
     fits.extend(finished(frame, both));
@@ -160,11 +161,6 @@ fn best_score(fits: &[JointFit]) -> f64 {
 
 fn rough_score(fit: &JointFit) -> f64 {
     fit.labels.log_likelihood.iter().sum()
-}
-
-/// The model of a state's parts before any is weighed.
-fn default_model(state: &JointState) -> Model {
-    Model::of_parts(state.has_cylinder, state.has_cone).first().copied().unwrap_or(Model::Cylinder)
 }
 
 fn without(state: &JointState, part: Part) -> JointState {

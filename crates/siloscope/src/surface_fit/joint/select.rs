@@ -33,7 +33,7 @@ pub fn weigh(frame: &Frame, fits: &[JointFit]) -> Vec<Weighed> {
     for (k, fit) in fits.iter().enumerate() {
         let likelihood: f64 = fit.labels.log_likelihood.iter().zip(&factors).map(|(ll, f)| ll / f).sum();
         let rest = fit.amplitudes.log_prior(fit.state.size()) - DEPOSIT_COST * fit.labels.patches as f64;
-        for &model in Model::of_parts(fit.state.has_cylinder, fit.state.has_cone) {
+        for &model in Model::of(&fit.state) {
             let Some(posterior) = fit.posterior(frame, model) else { continue };
             let log_evidence = likelihood + rest + posterior.log_evidence + model.log_prior();
             let mean = std::array::from_fn(|i| fit.state.x[i] + posterior.step[i]);
@@ -76,8 +76,8 @@ pub const NEGLIGIBLE: f64 = 1e-4;
 
 /// Mean and covariance of the parameters over the models: Σ w (C + d dᵀ), d the distance of a model's mean.
 ///
-/// The cone's own parameters are averaged over the models that have one. Where the evidence prefers a wall without form,
-/// the mean is that of an ideal wall. The covariance is always that of a wall with form: what a frame does not show may
+/// The cone's own parameters are averaged over the models that have one. Where the evidence prefers an ideal vessel, the
+/// mean is that of one. The covariance is always that of a usual one: what a frame does not show may
 /// still be there.
 pub fn averaged(frame: &Frame, fits: &[JointFit], weighed: &[Weighed], exact_camera: bool) -> Option<Average> {
     let mut parts = Vec::new();
@@ -108,13 +108,23 @@ fn at(fit: &JointFit, posterior: &Posterior) -> DVector<f64> {
     DVector::from_fn(SIZE, |i, _| fit.state.x[i] + posterior.step[i])
 }
 
-/// Mean of a wall without form where the evidence prefers it.
+/// Mean of a vessel that is as good as ideal, in its wall's form, its cone's place, or both, where the evidence prefers it.
 fn ideal_mean(frame: &Frame, fit: &JointFit, model: Model, wide: &Posterior) -> Option<DVector<f64>> {
-    let ideal = fit.amplitudes.ideal(fit.state.size());
-    let prior = prior(model, &fit.state, frame.inputs, frame.form, Some(&ideal));
-    let posterior = fit.quadratic.posterior(&fit.state.x, &prior)?;
-    let learned = fit.amplitudes.log_prior(fit.state.size());
-    (posterior.log_evidence > wide.log_evidence + learned).then(|| at(fit, &posterior))
+    let size = fit.state.size();
+    let learned = fit.amplitudes.log_prior(size);
+    let mut best = (wide.log_evidence + learned, None);
+    for (form, cone) in [(true, true), (true, false), (false, true)] {
+        let (amplitudes, own) = if form { (fit.amplitudes.ideal(size), 0.0) } else { (fit.amplitudes, learned) };
+        let mut prior = prior(model, &fit.state, frame.inputs, frame.form, Some(&amplitudes));
+        if cone && fit.state.has_cone {
+            model.place_cone(&mut prior, size, true);
+        }
+        let posterior = fit.quadratic.posterior(&fit.state.x, &prior)?;
+        if posterior.log_evidence + own > best.0 {
+            best = (posterior.log_evidence + own, Some(at(fit, &posterior)));
+        }
+    }
+    best.1
 }
 
 /// The averaged parameters.
