@@ -108,8 +108,8 @@ def test_without_times_there_is_no_use() -> None:
 @given(st.lists(st.floats(0.0, 10.0), min_size=2, max_size=60), st.floats(0.01, 3.0))
 def test_legs_take_turns_and_each_is_large_enough(volumes: list[float], least: float) -> None:
     volume = np.array(volumes)
-    found = list(legs(volume, least))
-    assert all(abs(volume[b] - volume[a]) > least and b > a for a, b in found)
+    found = list(legs(volume, np.full(len(volume), least / np.sqrt(2.0) * (1.0 + 1e-9))))
+    assert all(abs(volume[b] - volume[a]) > least * (1.0 - 1e-12) and b > a for a, b in found)
     signs = [np.sign(volume[b] - volume[a]) for a, b in found]
     assert all(s != t for s, t in itertools.pairwise(signs))
     assert all(one[1] == other[0] for one, other in itertools.pairwise(found))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -12,6 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 import siloscope
+import stories
 from silos import known, noisy, scene
 from siloscope.cli import main
 from siloscope.errors import InputError
@@ -21,7 +23,7 @@ from siloscope.tracking.clock import Clock, time_in_name
 from siloscope.tracking.outliers import gaps, outliers
 from siloscope.tracking.story import track_of
 from siloscope.types.floor import Floor
-from siloscope.types.track import Reading
+from siloscope.types.track import DAY, Reading
 
 MADE = noisy(scene(Feed("mound", 0.45)))
 HOUR = 3600.0
@@ -91,6 +93,42 @@ class TestOutliers:
         assert len(track_of(told).events) == 1
         told[-1] = replace(told[-1], coverage=0.1)
         assert track_of(told).events == ()
+
+
+def test_a_month_s_refills_are_told_and_no_others() -> None:
+    """Dust, outages, strayed readings, a dirty lens, a moved camera; `python -m benchmarks.track` asks more months."""
+    held = []
+    for seed in range(6):
+        story = stories.draw(seed)
+        for ullage in (False, True):
+            told = [replace(r, volume=None, volume_std=None) if ullage else r for r in story.readings]
+            found = track_of(told, capacity=story.capacity)
+            refills = tuple((e.start or 0.0, e.end or 0.0) for e in found.events if e.kind == "refill")
+            assert stories.refills(story, refills) == (0, 0), (seed, ullage)
+        for day in (9.0, 17.0, 25.0):
+            use = track_of(stories.until(story, day), capacity=story.capacity).use
+            assert use is not None
+            truth = story.empty_at(stories.START + DAY * day)
+            held.append((use.earliest or 0.0) <= truth <= (use.latest or math.inf))
+    assert np.mean(held) >= 0.85
+
+
+def test_a_moved_camera_makes_no_refill() -> None:
+    volumes = np.linspace(10.0, 8.0, 40)
+    told = readings(volumes)
+    moved = [replace(r, volume=(r.volume or 0.0) + 0.3, quality=("camera-moved",)) for r in told[20:]]
+    assert [e.kind for e in track_of([*told[:20], *moved]).events] == ["withdrawal"]
+    filled = [replace(r, volume=(r.volume or 0.0) + 3.0) for r in moved]
+    assert [e.kind for e in track_of([*told[:20], *filled]).events] == ["withdrawal", "refill", "withdrawal"]
+
+
+def test_a_delivery_is_told_by_the_clean_readings_about_its_dust() -> None:
+    volumes = [5.0, 4.9, 4.8, 7.0, 3.0, 8.0, 8.9, 8.8, 8.7]
+    told = readings(volumes)
+    dusty = [replace(r, quality=("dust-or-fog",)) if k in (3, 4, 5) else r for k, r in enumerate(told)]
+    refills = [e for e in track_of(dusty).events if e.kind == "refill"]
+    assert [(e.first, e.last) for e in refills] == [(2, 6)]
+    assert refills[0].volume == pytest.approx(4.1)
 
 
 def test_gaps_are_gaps() -> None:

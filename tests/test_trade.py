@@ -85,6 +85,34 @@ class TestTickets:
         assert {ticket.name for ticket in found.unmatched} == {"lost", "out", "T9"}
         assert found.density == pytest.approx(650.0, rel=0.01)
 
+    def test_packing_shows_where_deliveries_reach_deep_and_shallow(self) -> None:
+        """A content V that weighs 640 (V + 0.05 V² / 60), filled and emptied between 5 and 60 m³."""
+        off = []
+        for seed in range(20):
+            draw = np.random.default_rng(seed)
+            low, high = draw.uniform(4.0, 25.0, 16), draw.uniform(30.0, 60.0, 16)
+            levels = np.column_stack([low, high]).ravel()
+            weights = 640.0 * (levels + 0.05 * levels**2 / 60.0)
+            events, tickets = [], []
+            for k in range(len(levels) - 1):
+                start, moved = 1.7e9 + 86_400.0 * k, levels[k + 1] - levels[k]
+                kind = "refill" if moved > 0.0 else "withdrawal"
+                events.append(Event(kind, k, k + 1, start, start + 1800.0, abs(moved), 0.001 * abs(moved)))
+                mass = (weights[k + 1] - weights[k]) * (1.0 + 0.003 * draw.standard_normal())
+                tickets.append(Ticket(start + 600.0, mass, f"T{k}"))
+            found = reconcile(events, tickets, 0.003, dict(enumerate(levels.tolist()))).packing
+            assert found is not None
+            assert found.loose == pytest.approx(640.0, rel=0.02)
+            truth = 0.05 * found.volume / 60.0
+            assert found.growth == pytest.approx(truth, abs=0.02)
+            off.append((found.growth - truth) / found.growth_std)
+        assert 0.6 < float(np.std(off)) < 1.5
+
+    def test_packing_is_not_told_from_like_deliveries(self) -> None:
+        events, tickets = _events(10, 700.0)
+        volumes = {index: 1000.0 + index % 2 * event.volume for event in events for index in (event.first, event.last)}
+        assert reconcile(events, tickets, volumes=volumes).packing is None
+
     def test_one_event_is_no_density(self) -> None:
         assert reconcile(*_events(1, 650.0)).density is None
 

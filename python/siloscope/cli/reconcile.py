@@ -31,20 +31,28 @@ def reconcile(
     ] = 0.5,
     as_json: options.AsJson = False,
 ) -> int:
-    """Match weighbridge tickets with refills and withdrawals: the lot's density, and what does not match.
+    """Match weighbridge tickets with refills and withdrawals: the lot's density and packing, and what does not match.
 
     [bold]Example:[/bold] siloscope reconcile march/track.json --tickets tickets.csv --unit t
 
     Give the density to `measure --density` and `--density-std`: it replaces the 5 % of a product table. Exit code 4:
     fewer than two events have tickets.
     """
-    found = matched(_events(track), read_tickets(tickets, unit), scale_std / 100.0)
+    events, volumes = _story(track)
+    found = matched(events, read_tickets(tickets, unit), scale_std / 100.0, volumes)
     if as_json:
         print_json(found.to_dict())
     else:
         console = Console(highlight=False, soft_wrap=True)
         density = "unknown" if found.density is None else with_std(found.density, found.density_std, 1.0, " kg/m³")
         console.print(f"density {density} from {len(found.matches)} events", markup=False)
+        if found.packing is not None:
+            packing, percent = (
+                found.packing,
+                with_std(100 * found.packing.growth, 100 * found.packing.growth_std, 1.0, " %"),
+            )
+            loose = with_std(packing.loose, packing.loose_std, 1.0, " kg/m³")
+            console.print(f"packing: {loose} as poured, {percent} more at {packing.volume:.1f} m³", markup=False)
         for match in found.outlying:
             names = ", ".join(ticket.name for ticket in match.tickets)
             say(f"does not match: {names}, {match.density:.0f} kg/m³, {match.deviation:.0f} deviations off")
@@ -55,18 +63,20 @@ def reconcile(
     return 0 if found.density is not None else REFUSED
 
 
-def _events(path: Path) -> list[Event]:
-    """The events of a track's document."""
+def _story(path: Path) -> tuple[list[Event], dict[int, float]]:
+    """The events of a track's document, and the volumes of its readings by their index."""
     try:
         document = json.loads(path.read_bytes())
         if document["schema"] != TRACK:
             raise InputError(f"{path}: no track of the schema {TRACK}; give what `siloscope track --json` printed")
-        return [
+        events = [
             Event(
                 e["kind"], e["first"], e["last"], e["start"], e["end"], e["volume_m3"], e["volume_std_m3"], e["mass_kg"]
             )
             for e in document["events"]
         ]
+        readings = document.get("readings", ())
+        return events, {r["index"]: float(r["volume_m3"]) for r in readings if r["volume_m3"] is not None}
     except OSError as error:
         raise InputError(f"{path}: can't be read ({error.strerror}); check its name and permissions") from None
     except (ValueError, KeyError, TypeError, RecursionError):

@@ -51,12 +51,12 @@ def events(
     masses = np.full(len(volumes), np.nan) if mass is None else np.asarray(mass, np.float64)
     if len(volumes) < 2:
         return ()
-    least = _threshold(own, capacity)
+    least = _thresholds(own, capacity)
     found = []
     for turn, next_turn in legs(volumes, least):
-        first, last = _trimmed(volumes, turn, next_turn, 0.1 * least)
+        first, last = _trimmed(volumes, turn, next_turn, 0.1 * float(min(least[turn], least[next_turn])))
         amount, std = float(volumes[last] - volumes[first]), float(np.hypot(own[first], own[last]))
-        std = std if math.isfinite(std) else least / TURN_SIGMAS
+        std = std if math.isfinite(std) else float(np.hypot(least[first], least[last])) / TURN_SIGMAS
         kind = "refill" if amount > 0.0 else "withdrawal"
         known = last if kind == "refill" else first
         moved = abs(amount) * float(masses[known]) / float(volumes[known]) if volumes[known] else math.nan
@@ -65,28 +65,36 @@ def events(
     return tuple(found)
 
 
-def _threshold(own_std: NDArray[np.float64], capacity: float | None) -> float:
-    """Smallest change that is an event, m³."""
-    changes = np.hypot(own_std[:-1], own_std[1:])
-    known = changes[np.isfinite(changes)]
-    noise = TURN_SIGMAS * float(np.median(known)) if len(known) else 0.0
-    return max(noise, TURN_FRACTION * (capacity or 0.0), 1e-9)
+def _thresholds(own_std: NDArray[np.float64], capacity: float | None) -> NDArray[np.float64]:
+    """What each reading adds to the smallest change that is an event, m³: two of them are added as deviations are.
+
+    A reading counts with its own deviation or the usual one, whichever is larger: a lens that gets dirty makes readings
+    less sure, and a single one that claims much is no surer than its neighbours.
+    """
+    known = own_std[np.isfinite(own_std)]
+    usual = float(np.median(known)) if len(known) else 0.0
+    least = max(TURN_FRACTION * (capacity or 0.0), 1e-9) / math.sqrt(2.0)
+    return np.maximum(TURN_SIGMAS * np.maximum(np.nan_to_num(own_std), usual), least)
 
 
-def legs(volume: NDArray[np.float64], least: float) -> Iterator[tuple[int, int]]:
-    """Stretches between turning points that differ by more than `least`."""
+def legs(volume: NDArray[np.float64], least: NDArray[np.float64]) -> Iterator[tuple[int, int]]:
+    """Stretches between turning points that differ by more than their thresholds (N,), added as deviations are."""
+
+    def turned(i: int, j: int) -> bool:
+        return bool(abs(volume[i] - volume[j]) > math.hypot(least[i], least[j]))
+
     low = high = extreme = direction = 0
     turns: list[int] = []
     for i in range(1, len(volume)):
         if direction == 0:
             low, high = (i if volume[i] < volume[low] else low), (i if volume[i] > volume[high] else high)
-            if volume[high] - volume[low] > least:
+            if turned(low, high):
                 direction = 1 if high > low else -1
                 extreme = max(low, high)
                 turns = [min(low, high)]
         elif direction * (volume[i] - volume[extreme]) >= 0.0:
             extreme = i
-        elif direction * (volume[extreme] - volume[i]) > least:
+        elif turned(extreme, i):
             turns.append(extreme)
             direction, extreme = -direction, i
     if direction != 0:

@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.tracking.events import events
-from siloscope.tracking.outliers import gaps, outliers
+from siloscope.tracking.outliers import doubtful, gaps, outliers, without_steps
 from siloscope.tracking.use import use
 from siloscope.types.content import Content
 from siloscope.types.track import Reading, Track
+
+MOVED = "camera-moved"
+"""Remark on a reading whose errors are no longer those of its calibration."""
 
 OUTLIER = "outlier"
 """Code of a reading that stands apart from both neighbours; it makes no event."""
@@ -73,15 +76,19 @@ def track_of(
     basis = basis_of(readings)
     stock = [_stock(reading, basis) for reading in readings]
     answered = [k for k, value in enumerate(stock) if value is not None]
+    doubted = doubtful([readings[k].quality for k in answered])
+    beside = (np.append(doubted[1:], False) | np.insert(doubted[:-1], 0, False))[~doubted]
+    answered = [k for k, doubt in zip(answered, doubted, strict=True) if not doubt]
     columns = _columns([readings[k] for k in answered], [stock[k] for k in answered])
     time, amount, std, own, coverage, density = columns
-    apart = outliers(amount, own, coverage, capacity=capacity)
+    apart = outliers(amount, own, coverage, time=time, capacity=capacity, beside_doubt=beside)
     kept = [k for k, out in zip(answered, apart, strict=True) if not out]
     time, amount, std, own, density = (values[~apart] for values in (time, amount, std, own, density))
-    found = events(time, amount, own, capacity=capacity, mass=amount * density)
+    still = without_steps(amount, std, [MOVED in readings[k].quality for k in kept])
+    found = events(time, still, own, capacity=capacity, mass=still * density)
     told = _told(readings, stock, {k for k, out in zip(answered, apart, strict=True) if out})
     unread = tuple(Reading(len(told) + i, cause, None, "unreadable", cause) for i, cause in enumerate(problems))
-    used = use(time, amount - (0.0 if basis == "volume" else amount.min(initial=0.0)), std, found)
+    used = use(time, still - (0.0 if basis == "volume" else still.min(initial=0.0)), std, found)
     return Track(
         tuple(told) + unread,
         tuple(replace(e, first=readings[kept[e.first]].index, last=readings[kept[e.last]].index) for e in found),

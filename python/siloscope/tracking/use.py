@@ -17,6 +17,12 @@ FEWEST_DAYS = 1.0
 MOST_DAYS = 36_500.0
 """Longer histories have clocks that were set in between."""
 
+SMALL_SAMPLE = 1.2
+"""Half-width of a 95 % interval of n degrees of freedom over that of many: 1 + 1.2 / n (Student)."""
+
+MOST_CORRELATION = 0.8
+"""Of neighbouring days; a month of days can't show more."""
+
 FARTHEST = 3650.0
 """Days beyond which nobody forecasts."""
 
@@ -46,9 +52,13 @@ def use(time: ArrayLike, volume: ArrayLike, std: ArrayLike, events: Sequence[Eve
     if not FEWEST_DAYS <= span <= MOST_DAYS or used[-1] <= 0.0 or (np.diff(times) < 0.0).any():
         return None
     daily = float(used[-1]) / span
-    spread = _day_to_day(times, used, daily)
-    rate = Rate(daily, spread / math.sqrt(span), spread)
-    days = forecast(float(volumes[-1]), float(np.nan_to_num(deviations[-1])), rate)
+    days_used = _by_day(times, used)
+    spread = float(np.std(days_used, ddof=1)) if len(days_used) > 1 else daily
+    lasting = spread * _lasting(days_used)
+    rate = Rate(daily, lasting / math.sqrt(span), spread)
+    wider = 1.0 + SMALL_SAMPLE / max(span - 1.0, 1.0)
+    doubt = Rate(daily, wider * rate.daily_std, wider * lasting)
+    days = forecast(float(volumes[-1]), float(np.nan_to_num(deviations[-1])), doubt)
     empty, earliest, latest = (None if until is None else float(times[-1] + DAY * until) for until in days)
     return Use(rate.daily, rate.daily_std, rate.day_to_day, empty, earliest, latest)
 
@@ -70,13 +80,24 @@ def forecast(volume: float, std: float, rate: Rate) -> tuple[float | None, float
     return empty, earliest, latest
 
 
-def _day_to_day(times: NDArray[np.float64], used: NDArray[np.float64], daily: float) -> float:
-    """Standard deviation of one day's use; as large as the use itself while there are not two whole days."""
+def _by_day(times: NDArray[np.float64], used: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Use of each whole day, m³."""
     whole = int((times[-1] - times[0]) / DAY)
-    if whole < 2:
-        return daily
-    ends = times[0] + DAY * np.arange(whole + 1)
-    return float(np.std(np.diff(np.interp(ends, times, used)), ddof=1))
+    return np.diff(np.interp(times[0] + DAY * np.arange(whole + 1), times, used))
+
+
+def _lasting(days: NDArray[np.float64]) -> float:
+    """Factor by which the deviation of many days' use exceeds that of independent days.
+
+    A hungry day is followed by hungry days: √((1 + ρ) / (1 - ρ)) with the correlation ρ of neighbouring days, without
+    its bias of -(1 + 4 ρ) / n (Kendall 1954).
+    """
+    if len(days) < 3 or np.ptp(days) == 0.0:
+        return 1.0
+    off = days - days.mean()
+    found = float(off[1:] @ off[:-1] / (off @ off))
+    correlation = min(max(found + (1.0 + 4.0 * found) / len(days), 0.0), MOST_CORRELATION)
+    return math.sqrt((1.0 + correlation) / (1.0 - correlation))
 
 
 def _used(times: NDArray[np.float64], volume: NDArray[np.float64], events: Sequence[Event]) -> NDArray[np.float64]:
