@@ -41,6 +41,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("strap", "strap:strap", "Write a strapping table: volume by height, with its uncertainty."),
     Command("check-volume", "check_volume:check", "Check volumes by conservation: measured beside moved."),
     Command("reconcile", "reconcile:reconcile", "Match weighbridge tickets with a track: the lot's density."),
+    Command("plan", "plan:plan_command", "Plan where to hang a camera: the deviations to expect by place."),
     Command("reproduce", "reproduce:reproduce", "Repeat the paper's tables and figures, ours beside theirs."),
     Command("serve", "serve:serve", "Serve a site: frames in, readings, alerts, the page out."),
     Command("monitor", "monitor:monitor", "Look after a service's data: tokens, users, backup, restore, check."),

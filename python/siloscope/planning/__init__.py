@@ -1,0 +1,1 @@
+"""Where to hang a camera: the deviations to expect, before anything is mounted."""
