@@ -63,5 +63,5 @@ def _levels(axes: Axes, place: Place) -> None:
             said, (0.98, 100.0 * one.level), xycoords=("axes fraction", "data"), ha="right", fontsize=9, color=INK
         )
     axes.set_xlabel("standard deviation of the axis by one frame (mm)")
-    axes.set_xlim(left=0.0)
+    axes.set_xlim(0.0, 1.45 * max((1e3 * (one.axis_std or 0.0) for one in rows), default=1.0))
     axes.set_ylim(0.0, 100.0)
