@@ -31,6 +31,8 @@ pub const LEAST_ARC_ALONE: f64 = 1.0 / 6.0;
 /// A contradiction of gravity by more than this many standard deviations is no chance.
 const CONTRADICTION: f64 = 5.0;
 
+/// Least fraction of the tiles that must be wall.
+const LEAST_WALL: f64 = 0.03;
 /// Fewest tiles of a wall.
 const MIN_TILES: usize = 20;
 /// Least arc of a wall, rad: less is as good as flat.
@@ -52,6 +54,9 @@ pub fn judge(frame: &Frame, search: &Search) -> Result<(), Refusal> {
     let fit = search.fits.get(best.fit).ok_or(Refusal::NoWall)?;
     let [cylinder, cone] = wall_tiles(fit);
     let all = tiles_met(fit).max(1.0);
+    if cylinder + cone < LEAST_WALL * all {
+        return Err(Refusal::NoWall);
+    }
     let tied = best.model != Model::FreeCone && cone > cylinder; // else the axis is the cylinder's alone
     let weak = tied && cylinder < WEAK_CYLINDER * all;
     let sound = fit.state.x[SLOPE] < HOPPER_SLOPE && is_round(fit);
@@ -147,7 +152,7 @@ pub fn judge_wall(fit: &JointFit, evidence: &WallEvidence) -> Result<(), Refusal
         return Err(Refusal::NoWall);
     }
     let [turn, turn_std] = match evidence.turn_of_cylinder {
-        [turn, std] if std < TURN => [turn, std],
+        [turn, std] if 3.0 * std < TURN => [turn, std], // fewer tiles don't tell
         _ => [evidence.turn, evidence.turn_std],
     };
     if (turn - 1.0).abs() > TURN + 3.0 * turn_std {

@@ -25,13 +25,13 @@ const PROPOSALS: usize = 3;
 
 /// Log-likelihood of a ninth of the tiles by which a cylinder with a cone leaves one without no chance.
 const DECISIVE: f64 = 150.0;
+/// A cone that is off by more may be feed of any shape: its tiles agree without being independent, metres.
+const ROUGH_CONE: f64 = 3e-3;
 /// A model that is more probable than this leaves no other a say.
 const CERTAIN: f64 = 0.999;
 /// Least arc of the cylinder, as a fraction of the circle, and least fraction of the tiles.
 pub const LEAST_ARC: f64 = 0.25;
 const LEAST_CYLINDER: f64 = 0.08;
-/// Least fraction of the tiles that must be wall.
-const LEAST_WALL: f64 = 0.08;
 /// Most that a wall's tiles are off by without another model being asked, metres and as a fraction of the radius.
 const PLAIN_TAU: f64 = 1.5e-3;
 /// Most correlation of its residuals.
@@ -109,16 +109,16 @@ pub fn search(
     }
     let weak = both.iter().all(is_cylinder_weak);
     let (score, other) = (best_score(&both), best_score(&alone));
+    let rough = both.iter().any(|fit| fit.tau[1] > ROUGH_CONE);
     if weak {
         let cone_alone = cones.into_iter().filter_map(|state| anneal(frame, Model::ConeAlone, state));
         let cone_alone = cone_alone.filter(|fit| !Model::of(&fit.state).is_empty()).collect();
         fits.extend(finished(frame, cone_alone));
     }
     fits.extend(finished(frame, both));
-    if weak || other > score - DECISIVE {
+    if weak || rough || other > score - DECISIVE {
         fits.extend(finished(frame, alone));
     }
-    fits.retain(|fit| wall_tiles(fit).iter().sum::<f64>() > LEAST_WALL * tiles_met(fit));
     let mut weighed = weigh(frame, &fits);
     // a model's own widths are learned under its own prior
     let again = weighed.first().filter(|best| fits[best.fit].model != best.model).and_then(|best| {
