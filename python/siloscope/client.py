@@ -124,7 +124,16 @@ class Client:
             if after is None:
                 return
 
-    def get(self, path: str, query: dict[str, str] | None = None) -> dict[str, Any]:
+    def send_document(self, method: str, path: str, document: dict[str, Any]) -> dict[str, Any]:
+        """Any writing request of the interface; its answer."""
+        body = json.dumps(document, allow_nan=False).encode()
+        return self._ask(method, path, {"Content-Type": "application/json"}, body)[1]
+
+    def send_file(self, path: str, file: str | PathLike[str]) -> dict[str, Any]:
+        """Puts a file's bytes at an address of the interface; its answer."""
+        return self._ask("PUT", path, {"Content-Type": "application/octet-stream"}, Path(file).read_bytes())[1]
+
+    def get(self, path: str, query: dict[str, str] | list[tuple[str, str]] | None = None) -> dict[str, Any]:
         """Any document of the interface."""
         tail = f"?{urllib.parse.urlencode(query)}" if query else ""
         return self._ask("GET", path + tail, {}, None)[1]

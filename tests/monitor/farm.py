@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import json
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import uvicorn
+
 from siloscope import _core
+from siloscope.monitor import access, server
 from siloscope.monitor.alerts import Alerting
+from siloscope.monitor.api.app import create_app
 from siloscope.monitor.clock import DAY, HOUR, SECOND, SetClock
 from siloscope.monitor.publish.attach import attach
 from siloscope.monitor.service import Service
 from siloscope.monitor.settings import Settings
-from siloscope.monitor.store import places, readings
+from siloscope.monitor.store import frames, people, places, readings
 
 NOON = 1_798_718_400 * SECOND
 """2026-12-31 12:00 UTC, µs; the first reading is a second later."""
@@ -123,3 +130,39 @@ def rule(channel: str, kind: str = "low") -> str:
 
 LATE = 3 * HOUR
 """Longer than silo 7's readings are fresh."""
+
+
+def measured(service: Service, time: int, *, silo: str = "silo7", status: str = "ok", **more: Any) -> int:
+    """Adds a reading of a frame whose bytes are there."""
+    content = b"\x89PNG\r\n\x1a\n" + f"{silo} {time} {more}".encode()
+    with service.blobs.receiving() as part:
+        part.add(content)
+        service.blobs.keep(part)
+    arrival = frames.Arrival(f"cam{silo[-1]}", part.sha256, time, time, "good", "png", len(content))
+    frame, _ = frames.record(service.store, arrival, lambda: True)
+    with service.store.write() as connection:
+        frames.settle(connection, frame, silo, frames.MEASURED, time)
+    return reading(service, silo, time=time, frame=frame, status=status, **more)
+
+
+@contextmanager
+def listening(service: Service) -> Iterator[str]:
+    """The service's web server in a thread of this process; its address."""
+    sock = server.listening("127.0.0.1", 0)
+    config = uvicorn.Config(create_app(service), log_level="warning", timeout_graceful_shutdown=1)
+    web = uvicorn.Server(config)
+    thread = threading.Thread(target=web.run, kwargs={"sockets": [sock]}, daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{sock.getsockname()[1]}"
+    finally:
+        web.should_exit = True
+        thread.join(30)
+
+
+def token(service: Service, role: str) -> str:
+    """A token of a service."""
+    secret = access.new_secret(role)
+    with service.store.write() as connection:
+        people.add_token(connection, access.hash_of(secret), role, None, role, service.clock.now())
+    return secret

@@ -46,6 +46,8 @@ class Person:
     """The camera whose frames a token may send."""
     metrics: bool = False
     """Whether it may read the metrics."""
+    edge: bool = False
+    """Whether it is another installation that sends what it measured."""
     session: str | None = field(default=None, repr=False)
 
     @property
@@ -108,6 +110,8 @@ def by_token(connection: Connection, secret: str) -> Person | None:
             return Person(name, "token", camera=row.camera)
         case "metrics":
             return Person(name, "token", metrics=True)
+        case "edge":
+            return Person(name, "token", ((EVERYWHERE, "viewer"),), edge=True)
         case "admin":
             return Person(name, "token", ((EVERYWHERE, "admin"),), metrics=True)
         case _:

@@ -69,10 +69,9 @@ def capture(told: int | None, age: int | None, received: int) -> Capture:
     received : int
         The server's time, µs.
     """
-    if age is not None:
-        return Capture(received - age, CORRECTED)
-    if told is None:
-        return Capture(received, CORRECTED)
+    if age is not None or told is None:
+        time = received - (age or 0)
+        return Capture(time, SUSPECT if time < EARLIEST else CORRECTED)
     if told < EARLIEST or told > received + AHEAD:
         return Capture(told, SUSPECT)
     return Capture(told, GOOD)

@@ -38,6 +38,8 @@ class Told:
     age: int | None = None
     """µs since it was taken, by the sender's monotonic clock."""
     length: int | None = None
+    archived: bool = False
+    """Whether it was measured elsewhere: its reading is here, its bytes are to be kept beside it."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ class Intake:
         """The frame, where it was taken before; raises `Problem` where there is no room for another."""
         with self._store.read() as connection:
             known = frames.find(connection, told.camera, told.sha256) if told.sha256 else None
-            if known is not None and not frames.lost(known):
+            if known is not None and not frames.lost(known) and (known.kept or not told.archived):
                 return Taken(known.id, False)
             if frames.waiting(connection) >= self._limits.queue:
                 detail = f"{self._limits.queue} frames wait to be measured; keep the frame and send it later"
@@ -119,7 +121,7 @@ class Intake:
         arrival = frames.Arrival(told.camera, sha256, taken.time, received, taken.clock, part.format, part.size)
         place = self._blobs.path(sha256)
         try:
-            return Taken(*frames.record(self._store, arrival, place.exists))
+            return Taken(*frames.record(self._store, arrival, place.exists, archived=told.archived))
         except frames.BytesGone:
             detail = "the bytes were removed with an older frame of the same content; send it again"
             raise Problem("unavailable", detail, {"Retry-After": "1"}) from None

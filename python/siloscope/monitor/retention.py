@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from siloscope.monitor.blobs import Blobs
 from siloscope.monitor.clock import DAY, Clock
 from siloscope.monitor.settings import Limits, Retention
-from siloscope.monitor.store import aging, changes, deliveries, people
+from siloscope.monitor.store import aging, changes, deliveries, people, sync
 from siloscope.monitor.store.engine import Store
 
 BATCH = 500
@@ -48,7 +48,7 @@ class Keeper:
         total = 0
         while True:
             with self._store.write() as connection:
-                rows = aging.aged(connection, before, DAY, BATCH)
+                rows = aging.aged(connection, before, DAY, BATCH, *sync.free(connection))
                 aging.forget(connection, [row.id for row in rows])
             self._remove({row.sha256 for row in rows})
             total += len(rows)
@@ -60,7 +60,10 @@ class Keeper:
         total = 0
         while self._short():
             with self._store.write() as connection:
-                rows = aging.oldest(connection, BATCH // 10)
+                rows = aging.oldest(connection, BATCH // 10, *sync.free(connection))
+                rows = rows or aging.oldest(
+                    connection, BATCH // 10
+                )  # what the hub has not, only where nothing else is left
                 aging.forget(connection, [row.id for row in rows])
             self._remove({row.sha256 for row in rows})
             total += len(rows)

@@ -19,6 +19,7 @@ from siloscope.monitor.api import (
     alerts,
     calibrations,
     deliveries,
+    edge,
     frames,
     health,
     models,
@@ -42,7 +43,7 @@ PAGE = Path(__file__).parents[1] / "page"
 
 ROUTERS = (
     *(silos.router, readings.router, frames.router, alerts.router, rules.router, calibrations.router, tickets.router),
-    *(settings.router, session.router, people.router, deliveries.router, stream.router, health.router),
+    *(settings.router, session.router, people.router, deliveries.router, edge.router, stream.router, health.router),
 )
 
 HEADERS = {

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
-from siloscope.errors import InputError
+from siloscope.errors import InputError, UsageError
+from siloscope.monitor.edge import linked
 from siloscope.monitor.outbox import Channel, Deliverer
-from siloscope.monitor.outlets import secret
+from siloscope.monitor.outlets import EdgeEntry, secret
 from siloscope.monitor.service import Service
 
 
@@ -24,6 +26,8 @@ def attach(service: Service) -> None:
     outlets, site = service.outlets, service.settings.site
     if site is None:
         return
+    if outlets.hub is not None:
+        _link(service, outlets.hub, outlets.edge, site)
     if outlets.modbus is not None:
         service.parts.append(_module("modbus").Modbus(service, outlets.modbus))
     if outlets.mqtt is not None:
@@ -37,6 +41,15 @@ def attach(service: Service) -> None:
             service,
             _module("webhook").Webhook(service.store, service.clock, hook, secret(site, hook.secret_file)),
         )
+
+
+def _link(service: Service, address: str, entry: EdgeEntry | None, site: Path) -> None:
+    if entry is None:
+        raise InputError(f"{site}: 'hub' needs an [edge] table with the token_file that the hub knows this box by")
+    if not service.store.is_sqlite:
+        raise UsageError("an edge box keeps its data in SQLite; leave --database out, or leave 'hub' out of SITE.toml")
+    token = secret(site, entry.token_file)
+    service.parts.append(linked(service, address, token or "", entry, site))
 
 
 def _deliver(service: Service, channel: Channel) -> None:

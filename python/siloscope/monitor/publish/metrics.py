@@ -12,7 +12,7 @@ from sqlalchemy import Connection
 from siloscope import _core
 from siloscope.monitor.clock import SECOND
 from siloscope.monitor.service import Service
-from siloscope.monitor.store import alerts, deliveries, frames, places, readings
+from siloscope.monitor.store import alerts, deliveries, frames, places, readings, sync
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
@@ -74,7 +74,7 @@ class Collector:
             failed.add_metric([reason], number)
         yield failed
         pending = GaugeMetricFamily("siloscope_outbox_pending", "Undelivered things.", labels=["channel"])
-        for channel, number in deliveries.pending(connection).items():
+        for channel, number in (deliveries.pending(connection) | sync.pending(connection)).items():
             pending.add_metric([channel], number)
         yield pending
         given_up = GaugeMetricFamily("siloscope_outbox_failed", "Things that are tried no more.", labels=["channel"])

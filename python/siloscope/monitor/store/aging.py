@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from sqlalchemy import Connection, delete, func, select, update
+from sqlalchemy import ColumnElement, Connection, delete, func, select, update
 
 from siloscope.monitor.store.frames import FAILED, MEASURED
 from siloscope.monitor.store.rows import Record
 from siloscope.monitor.store.schema import frame, surface
 
 
-def aged(connection: Connection, before: int, step: int, count: int) -> Sequence[Record]:
-    """Kept frames that are done with, from before a time, but for the first of each camera and step."""
-    done = [frame.c.kept, frame.c.state.in_((MEASURED, FAILED)), frame.c.captured < before]
+def aged(connection: Connection, before: int, step: int, count: int, *free: ColumnElement[bool]) -> Sequence[Record]:
+    """Kept frames that are done with, from before a time, but for the first of each camera and step.
+
+    `free` are conditions of the frames that may go.
+    """
+    done = [frame.c.kept, frame.c.state.in_((MEASURED, FAILED)), frame.c.captured < before, *free]
     rank = func.row_number().over(
         partition_by=(frame.c.camera, frame.c.captured // step), order_by=(frame.c.state.desc(), frame.c.captured)
     )
@@ -22,9 +25,9 @@ def aged(connection: Connection, before: int, step: int, count: int) -> Sequence
     return connection.execute(wanted).all()
 
 
-def oldest(connection: Connection, count: int) -> Sequence[Record]:
-    """The oldest kept frames that are done with."""
-    wanted = select(frame.c.id, frame.c.sha256).where(frame.c.kept, frame.c.state.in_((MEASURED, FAILED)))
+def oldest(connection: Connection, count: int, *free: ColumnElement[bool]) -> Sequence[Record]:
+    """The oldest kept frames that are done with; `free` are conditions of those that may go."""
+    wanted = select(frame.c.id, frame.c.sha256).where(frame.c.kept, frame.c.state.in_((MEASURED, FAILED)), *free)
     return connection.execute(wanted.order_by(frame.c.captured).limit(count)).all()
 
 

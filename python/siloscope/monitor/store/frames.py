@@ -47,7 +47,7 @@ def get(connection: Connection, frame_id: str) -> Record | None:
     return connection.execute(wanted).one_or_none()
 
 
-def record(store: Store, arrival: Arrival, there: Callable[[], bool]) -> tuple[str, bool]:
+def record(store: Store, arrival: Arrival, there: Callable[[], bool], *, archived: bool = False) -> tuple[str, bool]:
     """Adds a frame to the queue, durably; its id, and whether it is new.
 
     A frame whose bytes were lost is queued again with the new ones. Raises `BytesGone` unless the bytes are `there`
@@ -66,6 +66,9 @@ def record(store: Store, arrival: Arrival, there: Callable[[], bool]) -> tuple[s
         if found is not None and lost(found):
             again = {"kept": True, "state": QUEUED, "attempts": 0, "not_before": 0, "error": None}
             connection.execute(update(frame).where(frame.c.id == found.id).values(**again))
+            return str(found.id), True
+        if found is not None and archived and not found.kept:
+            connection.execute(update(frame).where(frame.c.id == found.id).values(kept=True, bytes=arrival.bytes))
             return str(found.id), True
         return str(found.id if found else frame_id), False
 

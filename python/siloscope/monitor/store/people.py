@@ -14,7 +14,7 @@ from siloscope.monitor.store.schema_people import audit, grant, link, session, t
 ROLES = ("percent", "viewer", "operator", "admin")
 """From least to most: how full alone; everything to see; acknowledge, tickets, product; settings and people."""
 
-TOKEN_ROLES = ("camera", "read", "metrics", "admin")
+TOKEN_ROLES = ("camera", "read", "metrics", "edge", "admin")
 
 
 def count_users(connection: Connection) -> int:

@@ -189,5 +189,10 @@ def set_moved(connection: Connection, camera_id: str, since: int | None) -> None
 
 def document(row: Record) -> dict[str, Any]:
     """A calibration's document."""
-    found: dict[str, Any] = json.loads(zlib.decompress(row.document))
+    found: dict[str, Any] = json.loads(document_bytes(row))
     return found
+
+
+def document_bytes(row: Record) -> bytes:
+    """A calibration's document as text."""
+    return zlib.decompress(row.document)

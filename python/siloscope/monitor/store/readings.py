@@ -118,6 +118,12 @@ def surface_at(connection: Connection, silo: str, time: int) -> Record | None:
     return connection.execute(wanted).one_or_none()
 
 
+def surface_of(connection: Connection, reading_id: int) -> bytes | None:
+    """A reading's surface as it is kept."""
+    found: bytes | None = connection.execute(select(surface.c.blob).where(surface.c.reading == reading_id)).scalar()
+    return found
+
+
 def run_of(connection: Connection, version: str, config: str, origin: str, now: int, note: str | None = None) -> int:
     """The run of a program and its settings; a recomputation is always a new one."""
     if origin != "recomputed":

@@ -17,6 +17,14 @@ from siloscope.monitor.api.models.contents import (
     Trend,
     Vessel,
 )
+from siloscope.monitor.api.models.edge import (
+    EdgeAcknowledgement,
+    EdgeCalibration,
+    EdgeReading,
+    EdgeReadings,
+    EdgeSettings,
+    EdgeTaken,
+)
 from siloscope.monitor.api.models.frames import Frame, FrameTaken
 from siloscope.monitor.api.models.people import (
     AuditLine,
@@ -59,6 +67,12 @@ __all__ = [
     "Change",
     "Clock",
     "Delivery",
+    "EdgeAcknowledgement",
+    "EdgeCalibration",
+    "EdgeReading",
+    "EdgeReadings",
+    "EdgeSettings",
+    "EdgeTaken",
     "Event",
     "Forecast",
     "Frame",

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from siloscope.monitor.api.models.base import Model
 
 Role = Literal["percent", "viewer", "operator", "admin"]
-TokenRole = Literal["camera", "read", "metrics", "admin"]
+TokenRole = Literal["camera", "read", "metrics", "edge", "admin"]
 
 
 class Given(BaseModel):
