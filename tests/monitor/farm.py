@@ -49,18 +49,24 @@ silo = "silo8"
 """
 
 
-def make(folder: Path, more: str = "", *, clock: SetClock | None = None, silos: str = SILOS) -> Service:
+class Farm(Service):
+    """A service whose clock stands until it is set."""
+
+    clock: SetClock
+
+
+def make(folder: Path, more: str = "", *, clock: SetClock | None = None, silos: str = SILOS) -> Farm:
     """A prepared service that is not started, with what `more` adds to its SITE.toml; a table begins `more`."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "SITE.toml").write_text(silos + more)
     clock = clock or SetClock(NOON)
-    service = Service(replace(Settings(folder / "data"), site=folder / "SITE.toml", workers=0), clock)
+    service = Farm(replace(Settings(folder / "data"), site=folder / "SITE.toml", workers=0), clock)
     service.prepare()
     attach(service)
     return service
 
 
-def reading(service: Service, silo: str = "silo7", *, time: int | None = None, fill: float = 0.5, **more: Any) -> int:
+def reading(service: Farm, silo: str = "silo7", *, time: int | None = None, fill: float = 0.5, **more: Any) -> int:
     """Adds an answered reading of a silo of 20 m³, a second after what was before."""
     service.clock.time += SECOND
     now = service.clock.now()
@@ -98,7 +104,7 @@ def reading(service: Service, silo: str = "silo7", *, time: int | None = None, f
         return readings.add(connection, values, None, now)
 
 
-def forecast(service: Service, silo: str = "silo7", days: float = 3.0) -> None:
+def forecast(service: Farm, silo: str = "silo7", days: float = 3.0) -> None:
     """Says when a silo will be empty."""
     now = service.clock.now()
     row = {"time": now, "daily": 3.0, "daily_std": 0.1, "day_to_day": 0.2, "empty_by": now + int(days * DAY)}
@@ -106,18 +112,18 @@ def forecast(service: Service, silo: str = "silo7", days: float = 3.0) -> None:
         readings.replace_forecast(connection, silo, row | {"earliest": now + DAY, "latest": now + 5 * DAY})
 
 
-def close(service: Service) -> None:
+def close(service: Farm) -> None:
     """Lets go of a service that was not started."""
     service.store.close()
     service.lock.release()
 
 
-def look(service: Service, silo: str = "silo7") -> None:
+def look(service: Farm, silo: str = "silo7") -> None:
     """Lets the rules see a silo."""
     Alerting(service.store, service.outbox).look(silo, service.clock.now())
 
 
-def gone(service: Service, silo: str) -> None:
+def gone(service: Farm, silo: str) -> None:
     """Removes a silo."""
     with service.store.write() as connection:
         places.remove(connection, "silo", silo, service.clock.now())
@@ -132,7 +138,7 @@ LATE = 3 * HOUR
 """Longer than silo 7's readings are fresh."""
 
 
-def measured(service: Service, time: int, *, silo: str = "silo7", status: str = "ok", **more: Any) -> int:
+def measured(service: Farm, time: int, *, silo: str = "silo7", status: str = "ok", **more: Any) -> int:
     """Adds a reading of a frame whose bytes are there."""
     content = b"\x89PNG\r\n\x1a\n" + f"{silo} {time} {more}".encode()
     with service.blobs.receiving() as part:
@@ -146,7 +152,7 @@ def measured(service: Service, time: int, *, silo: str = "silo7", status: str = 
 
 
 @contextmanager
-def listening(service: Service) -> Iterator[str]:
+def listening(service: Farm) -> Iterator[str]:
     """The service's web server in a thread of this process; its address."""
     sock = server.listening("127.0.0.1", 0)
     config = uvicorn.Config(create_app(service), log_level="warning", timeout_graceful_shutdown=1)
@@ -160,7 +166,7 @@ def listening(service: Service) -> Iterator[str]:
         thread.join(30)
 
 
-def token(service: Service, role: str) -> str:
+def token(service: Farm, role: str) -> str:
     """A token of a service."""
     secret = access.new_secret(role)
     with service.store.write() as connection:

@@ -29,9 +29,14 @@ PLATFORMS = {
     | {"unit_of_measurement", "state_class", "suggested_display_precision", "last_reset_value_template"},
     "binary_sensor": ENTITY | {"payload_on", "payload_off", "off_delay"},
 }
-UNITS = {"volume_storage": {"m³", "L"}, "weight": {"kg", "t"}, "distance": {"m", "mm"}, "timestamp": {None}}
-CLASSES = {"sensor": {*UNITS, None}, "binary_sensor": {"problem", "connectivity"}}
-STATE_CLASSES = {
+UNITS: dict[str, set[str | None]] = {
+    "volume_storage": {"m³", "L"},
+    "weight": {"kg", "t"},
+    "distance": {"m", "mm"},
+    "timestamp": {None},
+}
+CLASSES: dict[str, set[str | None]] = {"sensor": {*UNITS, None}, "binary_sensor": {"problem", "connectivity"}}
+STATE_CLASSES: dict[str, set[str | None]] = {
     "volume_storage": {"measurement", None},
     "weight": {"measurement", None},
     "distance": {"measurement", None},

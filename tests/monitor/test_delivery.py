@@ -20,12 +20,12 @@ from aiosmtpd.controller import Controller
 from aiosmtpd.smtp import AuthResult, LoginPassword
 
 from monitor import farm
+from monitor.farm import Farm
 from monitor.servers import Server
 from siloscope.errors import InputError
 from siloscope.monitor.clock import DAY, HOUR, SECOND, SetClock
 from siloscope.monitor.outbox import GIVE_UP, LAST_RETRY, NotDelivered, Outbox, retry
 from siloscope.monitor.publish import webhook
-from siloscope.monitor.service import Service
 from siloscope.monitor.store import deliveries
 
 SECRET = "a secret of the receiver"
@@ -59,7 +59,7 @@ def receiving(status: int = 200) -> Iterator[Any]:
         server.server_close()
 
 
-def hooked(folder: Path, port: int, *, private: bool = True, clock: SetClock | None = None) -> Service:
+def hooked(folder: Path, port: int, *, private: bool = True, clock: SetClock | None = None) -> Farm:
     """A service with a webhook, and a low silo that is to be told of."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "secret").write_text(SECRET + "\n")
@@ -68,12 +68,12 @@ def hooked(folder: Path, port: int, *, private: bool = True, clock: SetClock | N
     return farm.make(folder, entry + farm.rule("erp"), clock=clock)
 
 
-def low(service: Service) -> None:
+def low(service: Farm) -> None:
     farm.reading(service, fill=0.1)
     farm.look(service)
 
 
-def waiting(service: Service) -> dict[str, int]:
+def waiting(service: Farm) -> dict[str, int]:
     with service.store.read() as connection:
         return deliveries.pending(connection)
 
@@ -183,7 +183,7 @@ def test_what_is_given_up_stays_in_sight_and_can_be_tried_again(tmp_path: Path) 
 def test_a_channel_that_fails_holds_up_no_other(tmp_path: Path) -> None:
     with receiving() as server:
         service = hooked(tmp_path, server.server_port)
-        service.outbox.channels = {"broken": Broken("broken"), **service.outbox.channels}  # type: ignore[dict-item]
+        service.outbox.channels = {"broken": Broken("broken"), **service.outbox.channels}
         low(service)
         with service.store.write() as connection:
             service.outbox.put(connection, "broken", "anything", {}, 0)
@@ -234,7 +234,7 @@ def mail_server() -> Iterator[tuple[Mailbox, int]]:
         controller.stop()
 
 
-def mailing(folder: Path, port: int, user: str = "farm") -> Service:
+def mailing(folder: Path, port: int, user: str = "farm") -> Farm:
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "password").write_text(SECRET)
     entry = f'[mail]\nhost = "127.0.0.1"\nport = {port}\nsecurity = "none"\nusername = "{user}"\n'

@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 
 from monitor import farm
+from monitor.farm import Farm
 from siloscope.client import Client, ServiceError
 from siloscope.errors import InputError
 from siloscope.monitor.clock import CORRECTED, DAY, HOUR, MINUTE, SECOND, SUSPECT, SetClock
 from siloscope.monitor.edge import Edge
 from siloscope.monitor.epochs import Uptime
 from siloscope.monitor.outlets import EdgeEntry
-from siloscope.monitor.service import Service
 from siloscope.monitor.store import aging, alerts, places, readings, sync
 
 SINCE = farm.NOON - 21 * DAY
@@ -44,26 +44,26 @@ class Machine:
 
 
 @pytest.fixture
-def hub(tmp_path: Path) -> Service:
+def hub(tmp_path: Path) -> Farm:
     return farm.make(tmp_path / "hub")
 
 
 @pytest.fixture
-def box(tmp_path: Path) -> Iterator[tuple[Service, Machine]]:
+def box(tmp_path: Path) -> Iterator[tuple[Farm, Machine]]:
     clock = SetClock(SINCE)
     service = farm.make(tmp_path / "edge", clock=clock)
     yield service, Machine(clock)
     farm.close(service)
 
 
-def linked(service: Service, machine: Machine, address: str, token: str, frames: Any = "samples") -> Edge:
+def linked(service: Farm, machine: Machine, address: str, token: str, frames: Any = "samples") -> Edge:
     entry = EdgeEntry(token_file="token", frames=frames, backlog_per_s=2000.0)
     edge = Edge(service, Client(address, token), entry, machine.told)
     edge._epochs.look()
     return edge
 
 
-def sent(edge: Edge, service: Service) -> int:
+def sent(edge: Edge, service: Farm) -> int:
     """Rounds until nothing is missing; how many."""
     for number in range(1, 300):
         edge.round()
@@ -73,12 +73,12 @@ def sent(edge: Edge, service: Service) -> int:
     raise AssertionError("it does not come to an end")
 
 
-def rows(service: Service, silo: str = "silo7") -> list[Any]:
+def rows(service: Farm, silo: str = "silo7") -> list[Any]:
     with service.store.read() as connection:
         return list(readings.page(connection, silo, readings.Span(), None, 10_000))
 
 
-def test_weeks_of_backlog_arrive_once_and_in_true_time(hub: Service, box: tuple[Service, Machine]) -> None:
+def test_weeks_of_backlog_arrive_once_and_in_true_time(hub: Farm, box: tuple[Farm, Machine]) -> None:
     """Three weeks without a link; in the second the box restarts with a clock of years ago that is set days later."""
     service, machine = box
     edge = linked(service, machine, "http://127.0.0.1:9", "no link")
@@ -117,7 +117,7 @@ def test_weeks_of_backlog_arrive_once_and_in_true_time(hub: Service, box: tuple[
         assert client.now("silo7")["reading"] == found[-1].id
 
 
-def test_a_box_whose_clock_is_wrong_now_is_put_right_by_the_hub(hub: Service, box: tuple[Service, Machine]) -> None:
+def test_a_box_whose_clock_is_wrong_now_is_put_right_by_the_hub(hub: Farm, box: tuple[Farm, Machine]) -> None:
     service, machine = box
     machine.restart(hub.clock.time - 400 * DAY)
     with farm.listening(hub) as address:
@@ -128,7 +128,7 @@ def test_a_box_whose_clock_is_wrong_now_is_put_right_by_the_hub(hub: Service, bo
     assert (abs(row.time - (hub.clock.time - HOUR)) < MINUTE, row.clock) == (True, CORRECTED)
 
 
-def test_what_nobody_can_date_is_stored_and_kept_out(hub: Service, box: tuple[Service, Machine]) -> None:
+def test_what_nobody_can_date_is_stored_and_kept_out(hub: Farm, box: tuple[Farm, Machine]) -> None:
     service, machine = box
     machine.restart(40 * DAY)  # 1970
     edge = linked(service, machine, "http://127.0.0.1:9", "no link")
@@ -143,7 +143,7 @@ def test_what_nobody_can_date_is_stored_and_kept_out(hub: Service, box: tuple[Se
         assert readings.last(connection, "silo7", answered=True) is None
 
 
-def test_samples_of_the_frames_go_up_and_nothing_goes_before(hub: Service, box: tuple[Service, Machine]) -> None:
+def test_samples_of_the_frames_go_up_and_nothing_goes_before(hub: Farm, box: tuple[Farm, Machine]) -> None:
     service, machine = box
     times = [SINCE + number * 6 * HOUR for number in range(16)]
     for number, time in enumerate(times):
@@ -163,14 +163,14 @@ def test_samples_of_the_frames_go_up_and_nothing_goes_before(hub: Service, box: 
     assert set(kept) == {*days.values(), times[5]}
 
 
-def contents(hub: Service, address: str) -> list[bool]:
+def contents(hub: Farm, address: str) -> list[bool]:
     """Of each frame by its time, whether the hub has its bytes."""
     client = Client(address, farm.token(hub, "read"))
     found = sorted(client.pages("/api/v1/frames", {}), key=lambda frame: str(frame["captured"]))
     return [frame["kept"] and hub.blobs.intact(frame["sha256"]) for frame in found]
 
 
-def test_settings_come_down_and_acknowledgements_go_up(hub: Service, box: tuple[Service, Machine]) -> None:
+def test_settings_come_down_and_acknowledgements_go_up(hub: Farm, box: tuple[Farm, Machine]) -> None:
     service, machine = box
     machine.clock.time = hub.clock.time
     with farm.listening(hub) as address:
@@ -198,13 +198,13 @@ def test_settings_come_down_and_acknowledgements_go_up(hub: Service, box: tuple[
         assert (firing(hub)[0].acknowledged_by, firing(hub)[0].note) == ("Anna", "seen")
 
 
-def firing(service: Service) -> list[Any]:
+def firing(service: Farm) -> list[Any]:
     with service.store.read() as connection:
         found = alerts.listed(connection, silo="silo7", firing=True, before=None, count=9)
     return [row for row in found if row.kind == "low"]
 
 
-def test_a_hub_that_refuses_loses_nothing_and_says_why(hub: Service, box: tuple[Service, Machine]) -> None:
+def test_a_hub_that_refuses_loses_nothing_and_says_why(hub: Farm, box: tuple[Farm, Machine]) -> None:
     service, machine = box
     machine.clock.time = hub.clock.time
     farm.measured(service, machine.clock.time)

@@ -11,8 +11,8 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from monitor import farm
+from monitor.farm import Farm
 from siloscope.monitor.publish import metrics
-from siloscope.monitor.service import Service
 
 LISTED = (
     *("volume_cubic_meters", "volume_std_cubic_meters", "fill_ratio", "mass_kilograms", "reading_timestamp_seconds"),
@@ -21,7 +21,7 @@ LISTED = (
 )
 
 
-def samples(service: Service) -> dict[str, dict[tuple[str, ...], float]]:
+def samples(service: Farm) -> dict[str, dict[tuple[str, ...], float]]:
     found: dict[str, Any] = {}
     for family in text_string_to_metric_families(metrics.text(service).decode()):
         found[family.name] = {

@@ -10,21 +10,21 @@ import struct
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import pytest
 from pymodbus.client import ModbusTcpClient
 
 from monitor import farm
+from monitor.farm import Farm
 from siloscope.errors import UsageError
 from siloscope.monitor.publish.modbus import QUALITY, Modbus
-from siloscope.monitor.service import Service
 
 MODBUS = "[modbus]\nport = 0\n"
 
 
 @pytest.fixture
-def service(tmp_path: Path) -> Iterator[Service]:
+def service(tmp_path: Path) -> Iterator[Farm]:
     made = farm.make(tmp_path, MODBUS)
     farm.reading(made)
     farm.forecast(made)
@@ -34,14 +34,14 @@ def service(tmp_path: Path) -> Iterator[Service]:
     farm.close(made)
 
 
-def server(service: Service) -> Modbus:
+def server(service: Farm) -> Modbus:
     found = service.parts[0]
     assert isinstance(found, Modbus)
     return found
 
 
 @pytest.fixture
-def client(service: Service) -> Iterator[ModbusTcpClient]:
+def client(service: Farm) -> Iterator[ModbusTcpClient]:
     with ModbusTcpClient("127.0.0.1", port=server(service).port, timeout=10) as connected:
         yield connected
 
@@ -51,7 +51,7 @@ def read(
 ) -> Any:
     found = client.read_holding_registers(first, count=count, device_id=unit)
     assert not found.isError(), found
-    order = "little" if swapped else "big"
+    order: Literal["little", "big"] = "little" if swapped else "big"
     return client.convert_from_registers(found.registers, getattr(client.DATATYPE, kind), word_order=order)
 
 
@@ -65,7 +65,7 @@ def test_a_level_transmitters_registers_have_its_order(client: ModbusTcpClient) 
     assert read(client, "STRING", 24) == "ilo7"
 
 
-def test_our_registers_say_more(client: ModbusTcpClient, service: Service) -> None:
+def test_our_registers_say_more(client: ModbusTcpClient, service: Farm) -> None:
     values = read(client, "FLOAT32", 100, 22)
     assert values == pytest.approx([10.0, 0.1, 10.0, 50.0, 7700.0, 100.0, 2.5, 3.5, 3.2, 0.9, 3.0])
     now = service.clock.now() // 1_000_000
@@ -80,7 +80,7 @@ def test_both_word_orders_say_the_same(client: ModbusTcpClient, first: int, coun
     assert read(client, "STRING", 1024) == "ilo7"
 
 
-def test_an_old_answer_is_no_number(client: ModbusTcpClient, service: Service) -> None:
+def test_an_old_answer_is_no_number(client: ModbusTcpClient, service: Farm) -> None:
     service.clock.time += farm.LATE
     server(service)._made = -math.inf
     assert all(math.isnan(value) for value in read(client, "FLOAT32", 0, 22) + read(client, "FLOAT32", 100, 22))
@@ -88,7 +88,7 @@ def test_an_old_answer_is_no_number(client: ModbusTcpClient, service: Service) -
     assert read(client, "UINT32", 126) == farm.LATE // 1_000_000
 
 
-def test_remarks_are_bits(client: ModbusTcpClient, service: Service) -> None:
+def test_remarks_are_bits(client: ModbusTcpClient, service: Farm) -> None:
     farm.reading(service, time=service.clock.now() + 1, quality=[{"code": "lens-film"}, {"code": "rathole"}])
     server(service)._made = -math.inf
     assert read(client, "UINT16", 129, 1) == 1 << QUALITY.index("lens-film") | 1 << QUALITY.index("rathole")
@@ -111,11 +111,11 @@ def test_what_cannot_be_is_refused_by_its_code(client: ModbusTcpClient) -> None:
 
 
 @pytest.mark.parametrize("count", [0, 126, 65_535])
-def test_a_wrong_count_is_refused(service: Service, count: int) -> None:
+def test_a_wrong_count_is_refused(service: Farm, count: int) -> None:
     assert server(service).answer(7, struct.pack(">BHH", 3, 0, count)) == b"\x83\x03"
 
 
-def test_rubbish_ends_a_connection_and_nothing_else(client: ModbusTcpClient, service: Service) -> None:
+def test_rubbish_ends_a_connection_and_nothing_else(client: ModbusTcpClient, service: Farm) -> None:
     noise = random.Random(7)
     for _ in range(100):
         with socket.create_connection(("127.0.0.1", server(service).port), timeout=10) as sock:
@@ -124,7 +124,7 @@ def test_rubbish_ends_a_connection_and_nothing_else(client: ModbusTcpClient, ser
 
 
 @pytest.mark.skipif(shutil.which("mbpoll") is None, reason="mbpoll is not installed; `make services` installs it")
-def test_a_foreign_client_reads_the_same(service: Service) -> None:
+def test_a_foreign_client_reads_the_same(service: Farm) -> None:
     """Its addresses begin at 1, as a manual's 40001."""
     command = ["mbpoll", "-m", "tcp", "-p", str(server(service).port), "-a", "7", "-1", "-B", "-t", "4:float"]
     done = subprocess.run([*command, "-r", "101", "-c", "4", "127.0.0.1"], capture_output=True, text=True, check=True)
@@ -132,6 +132,6 @@ def test_a_foreign_client_reads_the_same(service: Service) -> None:
     assert [float(value) for value in values] == pytest.approx([10.0, 0.1, 10.0, 50.0])
 
 
-def test_a_taken_port_is_told_at_the_start(service: Service, tmp_path: Path) -> None:
+def test_a_taken_port_is_told_at_the_start(service: Farm, tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="modbus"):
         farm.make(tmp_path / "second", f"[modbus]\nport = {server(service).port}\n")

@@ -18,11 +18,11 @@ import pytest
 from paho.mqtt.enums import CallbackAPIVersion
 
 from monitor import farm, home_assistant
+from monitor.farm import Farm
 from monitor.servers import eventually, serving
 from siloscope.monitor.publish import discovery
 from siloscope.monitor.publish.image import images
 from siloscope.monitor.publish.mqtt import Mqtt, state
-from siloscope.monitor.service import Service
 
 MOSQUITTO = shutil.which("mosquitto") or shutil.which("mosquitto", path="/usr/sbin")
 
@@ -102,7 +102,7 @@ def entry(port: int, more: str = "") -> str:
     return f'[mqtt]\nhost = "127.0.0.1"\nport = {port}\nbox = "box1"\n{more}'
 
 
-def running(folder: Path, port: int, more: str = "") -> Service:
+def running(folder: Path, port: int, more: str = "") -> Farm:
     service = farm.make(folder, entry(port, more) + farm.rule("mqtt"))
     farm.reading(service)
     for part in service.parts:
@@ -110,7 +110,7 @@ def running(folder: Path, port: int, more: str = "") -> Service:
     return service
 
 
-def stopped(service: Service) -> None:
+def stopped(service: Farm) -> None:
     for part in service.parts:
         part.stop()
     farm.close(service)
@@ -301,7 +301,7 @@ def test_tls_and_password_are_asked_for_and_given(tmp_path: Path) -> None:
         client.tls_set_context(ssl.create_default_context(cafile=str(folder / "cert.pem")))
         came: queue.Queue[bytes] = queue.Queue()
         client.on_connect = lambda connected, *_: connected.subscribe("siloscope/box1/status", 1)
-        client.on_message = lambda _client, _data, message: came.put(message.payload)
+        client.on_message = lambda _client, _data, message: came.put(bytes(message.payload))
         client.connect("127.0.0.1", broker.port)
         client.loop_start()
         assert came.get(timeout=20) == b"online"
