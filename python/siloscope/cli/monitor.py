@@ -26,7 +26,8 @@ def monitor(
     data: Annotated[Path | None, typer.Option("--data", metavar="DIR", help="The service's folder.")] = None,
     database: Database = None,
     role: Annotated[
-        str | None, typer.Option(help="token: camera, read, metrics, admin. user: percent, viewer, operator, admin.")
+        str | None,
+        typer.Option(help="token: camera, read, metrics, edge, admin. user: percent, viewer, operator, admin."),
     ] = None,
     camera: Annotated[str | None, typer.Option(metavar="ID", help="token: the camera that it is for.")] = None,
     place: Annotated[
