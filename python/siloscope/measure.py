@@ -13,10 +13,10 @@ from siloscope import sensors
 from siloscope.calibrate import calibrate
 from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density, choose
-from siloscope.content.knowledge import camera_of, know
-from siloscope.content.measuring import content_in_silo
+from siloscope.content.knowledge import know
 from siloscope.content.outlined import outlined, pose_of
-from siloscope.content.reading import Request, source_of, unlocated
+from siloscope.content.reading import source_of, unlocated
+from siloscope.content.silo_content import SiloContent
 from siloscope.content.units import at_moisture
 from siloscope.errors import UsageError
 from siloscope.estimation.inputs import prepare
@@ -143,8 +143,5 @@ def measure(
     else:
         silo = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
         known = know(silo, profile, sheet, top, sheet.diameter, steepest)
-    prepared = prepare(data, camera_of(data, camera, silo), profile or sensors.UNKNOWN,
-                       depth_unit=depth_unit, mask=mask)  # fmt: skip
-    request = Request(data, known, sheet, table, chosen, previous, calibration is None)
-    ms = 1e3 * (time.perf_counter() - start)
-    return replace(content_in_silo(prepared, silo, about, request, ms), moisture=moisture)
+    content = SiloContent(silo, about, known, profile, table, chosen, moisture, calibration is None)
+    return content.measure(data, camera, depth_unit=depth_unit, mask=mask, previous=previous, since=start)
