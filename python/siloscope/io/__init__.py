@@ -34,6 +34,7 @@ _MODULES = (
     "recordings.containers.rosbag1",
     "recordings.containers.mcap",
     "recordings.containers.sqlite_bag",
+    "sealed",
     "archive",
     "recordings.containers.ros2_folder",
     "recordings.containers.mkv",

@@ -91,7 +91,7 @@ class Writer:
         if depth is None or depth.dtype.name not in _DTYPES:
             kind = "points" if depth is None else f"{depth.dtype} depth"
             raise InputError(f"{frame.source}: an archive holds depth images (uint16 or floating point), not {kind}")
-        head = _head_of(frame, depth)
+        head = head_of(frame, depth)
         if self._head is None:
             self._begin(head, frame)
         else:
@@ -169,7 +169,7 @@ def write(path: str | os.PathLike[str], frames: Iterable[Frame]) -> int:
         return archive.count - before
 
 
-def _head_of(frame: Frame, depth: NDArray[Any]) -> dict[str, Any]:
+def head_of(frame: Frame, depth: NDArray[Any]) -> dict[str, Any]:
     """What all frames of an archive have in common."""
     height, width = depth.shape
     raw = depth.dtype == np.uint16
@@ -192,6 +192,9 @@ def _replace(path: Path, data: bytes) -> None:
 
 class ArchiveSource(FrameSource):
     """The frames of an archive."""
+
+    rows = _ROWS
+    """Frames a chunk of the small arrays."""
 
     def __init__(self, path: Path, options: Options) -> None:
         super().__init__(path, "archive", options)
@@ -236,11 +239,15 @@ class ArchiveSource(FrameSource):
         names = [codec.get("name") for codec in codecs if isinstance(codec, dict)] if isinstance(codecs, list) else []
         sides = shape if isinstance(shape, list) and len(shape) == 3 else []
         whole = bool(sides) and all(type(n) is int and n >= 0 for n in sides)
-        if not whole or dtype not in _DTYPES or names != ["bytes", "blosc", "crc32c"]:
+        if not whole or dtype not in _DTYPES or not self._is_ours(array, names):
             raise InputError(f"{self.name}: its depth array is not as siloscope writes it; convert the frames again")
         frames, height, width = sides
         check_image_size(self.name, width, height)
         return str(dtype), (height, width), frames
+
+    def _is_ours(self, array: dict[str, Any], codecs: list[Any]) -> bool:
+        """Whether the depth's chunks are packed as this source reads them."""
+        return codecs == ["bytes", "blosc", "crc32c"]
 
     def _numbers(self) -> list[int]:
         """Numbers of the frames that are there, in order."""
@@ -252,15 +259,16 @@ class ArchiveSource(FrameSource):
     def _rows(self, name: str, width: int) -> NDArray[np.float64]:
         """The values of a small array up to the last frame there is; NaN where they are missing or damaged."""
         last = self.numbers[-1] + 1 if self.numbers else 0
-        rows = np.full((-(-last // _ROWS) * _ROWS, width), np.nan)
-        for chunk in range(len(rows) // _ROWS):
+        step = self.rows
+        rows = np.full((-(-last // step) * step, width), np.nan)
+        for chunk in range(len(rows) // step):
             path = self.path / name / (f"c.{chunk}" if width == 1 else f"c.{chunk}.0")
             try:
                 data = without_checksum(path.read_bytes())
             except (OSError, InputError):
                 continue
-            if len(data) == _ROWS * width * 8:
-                rows[chunk * _ROWS : (chunk + 1) * _ROWS] = np.frombuffer(data, "<f8").reshape(-1, width)
+            if len(data) == step * width * 8:
+                rows[chunk * step : (chunk + 1) * step] = np.frombuffer(data, "<f8").reshape(-1, width)
         return rows[:last]
 
     def digests(self) -> NDArray[np.uint8]:
@@ -300,12 +308,16 @@ class ArchiveSource(FrameSource):
     def _loss(self) -> str:
         return f"{self.name}: {self.missing} of {self.missing + len(self.numbers)} frames are missing"
 
-    def _decode(self, number: int) -> Frame:
+    def _chunk(self, number: int) -> bytes:
+        """The stored bytes of a frame."""
         path = self.path / "depth" / f"c.{number}.0.0"
         try:
-            data = path.read_bytes()
+            return path.read_bytes()
         except OSError as error:
             raise InputError(f"frame {number}: {path} can't be read ({error.strerror})") from None
+
+    def _decode(self, number: int) -> Frame:
+        data = self._chunk(number)
         depth = decompressed(without_checksum(data), self.shape, self.dtype)
         time, gravity = float(self.times[number]), self.gravities[number]
         return Frame(
