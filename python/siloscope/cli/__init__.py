@@ -1,7 +1,7 @@
 """The command line. Only this package prints and exits; everything it does is a call of the public API.
 
 A command is one module here with a function whose parameters are its arguments and options, which returns the exit
-code (None for 0), and one line in `COMMANDS`.
+code (None for 0), and one line in `COMMANDS`. A command with commands of its own has a `typer.Typer` of such functions.
 """
 
 from __future__ import annotations
@@ -43,6 +43,8 @@ COMMANDS: tuple[Command, ...] = (
     Command("reconcile", "reconcile:reconcile", "Match weighbridge tickets with a track: the lot's density."),
     Command("plan", "plan:plan_command", "Plan where to hang a camera: the deviations to expect by place."),
     Command("reproduce", "reproduce:reproduce", "Repeat the paper's tables and figures, ours beside theirs."),
+    Command("pack", "pack:pack", "Seal frames in Zarr shards beside a manifest, for many machines."),
+    Command("fleet", "fleet:fleet", "Measure many sealed frames on many machines: plan, run, compare, publish."),
     Command("serve", "serve:serve", "Serve a site: frames in, readings, alerts, the page out."),
     Command("monitor", "monitor:monitor", "Look after a service's data: tokens, users, backup, restore, check."),
     Command("simulate", "simulate:simulate", "Write depth frames of a simulated silo, with their exact truth."),
@@ -61,7 +63,10 @@ def _app(arguments: Sequence[str]) -> typer.Typer:
     app.callback()(_siloscope)
     completing = "_SILOSCOPE_COMPLETE" in os.environ
     for command in COMMANDS:
-        function = _load(command) if completing or command.name in arguments else _not_loaded
+        function = _load(command) if completing or command.name in arguments[:1] else _not_loaded
+        if isinstance(function, typer.Typer):
+            app.add_typer(function, name=command.name, short_help=command.help)
+            continue
         text = None if function is not _not_loaded else command.help
         app.command(command.name, help=text, short_help=command.help, no_args_is_help=False)(function)
     return app
