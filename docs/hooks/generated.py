@@ -34,16 +34,30 @@ def commands() -> str:
     """The help text of every command."""
     from siloscope.cli import COMMANDS
 
-    return "\n\n".join(f"## {command.name}\n\n{command.help}\n\n{_help(command.name)}" for command in COMMANDS)
+    parts = []
+    for command in COMMANDS:
+        parts.append(f"## {command.name}\n\n{command.help}\n\n{_help(command.name)}")
+        parts += [f"### {command.name} {name}\n\n{_help(command.name, name)}" for name in _below(command)]
+    return "\n\n".join(parts)
 
 
-def _help(command: str) -> str:
+def _below(command: Any) -> list[str]:
+    """The names of the commands that a command has."""
+    import typer
+
+    module, name = command.target.split(":")
+    found = getattr(import_module(f"siloscope.cli.{module}"), name)
+    below = found.registered_commands if isinstance(found, typer.Typer) else ()
+    return [str(each.name) for each in below]
+
+
+def _help(*command: str) -> str:
     from siloscope.cli import main
 
     os.environ.update(NO_COLOR="1", COLUMNS="100", TERMINAL_WIDTH="100")
     shown = io.StringIO()
     with contextlib.redirect_stdout(shown):
-        main([command, "--help"])
+        main([*command, "--help"])
     lines = [line.rstrip() for line in shown.getvalue().strip("\n").splitlines()]
     return "```text\n" + "\n".join(lines) + "\n```"
 

@@ -1,0 +1,1 @@
+"""Tests of packing and of runs over many frames."""
