@@ -33,6 +33,9 @@ class RayEngine:
             raise InputError(f"Ray can't be reached ({' '.join(str(error).split())[:200]}); check --address") from None
         alone = {} if address is None else {"runtime_env": {"env_vars": dict.fromkeys(ONE_CORE, "1")}}
         self._perform = self._ray.remote(num_cpus=1, max_retries=0, **alone)(perform)
+        ended = ("WorkerCrashedError", "OutOfMemoryError", "NodeDiedError", "TaskUnschedulableError")
+        self._of_a_task = tuple(getattr(self._ray.exceptions, name) for name in ended)
+        """Errors of one task or one node of a cluster; any other means that there is no Ray any more."""
         self._given = place, run
         self._window = WINDOW * workers
         self._working: dict[Any, Task] = {}
@@ -59,6 +62,10 @@ class RayEngine:
             found: Outcome = self._ray.get(handle)
         except self._ray.exceptions.RayTaskError as error:
             return reason(error.cause)
-        except self._ray.exceptions.RayError as error:
+        except self._of_a_task as error:
             return f"{type(error).__name__}: {' '.join(str(error).split())[:200]}"
+        except self._ray.exceptions.RayError as error:
+            raise InputError(
+                f"Ray has ended ({type(error).__name__}); start the run again, what is committed is not done again"
+            ) from None
         return found
