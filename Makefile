@@ -13,7 +13,7 @@ export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
 .PHONY: help setup build build-dev demo test check style lint types deny rustdoc rust-test python-test coverage bench golden \
-	golden-renew fuzz docs images dist wheels third-party requirements hooks release format clean
+	golden-renew fleet-proof fuzz docs images dist wheels third-party requirements hooks release format clean
 
 help: ## shows this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
@@ -75,6 +75,10 @@ types: build
 	$(BIN)/mypy
 	$(BIN)/mypy --config-file tests/mypy.ini
 	$(BIN)/python -m mypy.stubtest siloscope._core --allowlist tests/stubtest-allowlist.txt
+
+fleet-proof: build ## proves the fleet on 2,000 frames: equal bytes, kills, Ray's overhead, memory; a plan of 10^6 shards
+	$(BIN)/python benchmarks/fleet_proof.py --folder build/fleet-proof
+	$(BIN)/python benchmarks/fleet_plan.py
 
 golden: build ## compares about 400 answers with the ones kept in tests/golden, to the last bit
 	$(BIN)/python tests/golden/golden.py

@@ -92,7 +92,7 @@ def test_ranges_names_and_sizes(any_store: Any) -> None:
     any_store.put("a/d", b"")
     assert any_store.get_range("a/b/c", 2, 3) == b"234"
     assert any_store.get_tail("a/b/c", 4) == b"6789"
-    assert {(entry.name, entry.size) for entry in any_store.names("a/")} == {("a/b/c", 10), ("a/d", 0)}
+    assert set(any_store.names("a/")) == {"a/b/c", "a/d"}
     assert sorted(any_store.below("a/")) == ["b", "d"]
     assert (any_store.size("a/b/c"), any_store.size("none")) == (10, None)
     with pytest.raises(Missing):
@@ -108,10 +108,10 @@ def test_a_run_in_an_object_store_gives_the_same_bytes(
         plan.make(f"{place}/store", f"{place}/run", calibrations, measuring)
         run(f"{place}/run", workers=2)
     remote = open_store(f"{s3}/whole/run")
-    for entry in remote.names(""):
-        local = tmp_path / "copy" / entry.name
+    for name in remote.names(""):
+        local = tmp_path / "copy" / name
         local.parent.mkdir(parents=True, exist_ok=True)
-        local.write_bytes(remote.get(entry.name))
+        local.write_bytes(remote.get(name))
     assert answers(tmp_path / "copy") == answers(tmp_path / "folder" / "run")
     published = publish(Opened.of(f"{s3}/whole/run"))
     assert published["previous"] is None

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from siloscope.errors import InputError
-from siloscope.fleet.store import Entry, Missing
+from siloscope.fleet.store import Missing
 
 _LOCK = ".lock"
 
@@ -83,14 +83,13 @@ class FolderStore:
         except FileNotFoundError:
             return None
 
-    def names(self, prefix: str) -> Iterator[Entry]:
+    def names(self, prefix: str) -> Iterator[str]:
         """All files below a folder but the unfinished."""
         top = self.folder / prefix
         for folder, _, files in os.walk(top):
-            inside = Path(folder).relative_to(self.folder)
-            for file in files:
-                if not file.startswith("."):
-                    yield Entry(str(inside / file), (Path(folder) / file).stat().st_size)
+            inside = Path(folder).relative_to(self.folder).as_posix()
+            start = "" if inside == "." else f"{inside}/"
+            yield from (f"{start}{file}" for file in files if not file.startswith("."))
 
     def below(self, prefix: str) -> list[str]:
         """Names of files and folders directly below."""

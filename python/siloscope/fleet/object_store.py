@@ -8,7 +8,7 @@ from datetime import timedelta
 from typing import Any, TypeVar
 
 from siloscope.errors import InputError
-from siloscope.fleet.store import Entry, Missing
+from siloscope.fleet.store import Missing
 from siloscope.io.extras import need
 
 Result = TypeVar("Result")
@@ -80,11 +80,11 @@ class ObjectStore:
         except Missing:
             return None
 
-    def names(self, prefix: str) -> Iterator[Entry]:
+    def names(self, prefix: str) -> Iterator[str]:
         """All objects of a prefix, a thousand a request."""
         try:
             for page in self._obstore.list(self._store, prefix.rstrip("/") or None, chunk_size=1000):
-                yield from (Entry(entry["path"], entry["size"]) for entry in page)
+                yield from (entry["path"] for entry in page)
         except self._errors.BaseError as error:
             raise self._failed(prefix, error) from None
 

@@ -107,8 +107,8 @@ class Reporter:
 def costs(place: Store, run: str) -> dict[str, float]:
     """What all drivers and workers of a run have spent so far: ``core_hours`` and ``bytes_read``."""
     spent = {"core_hours": 0.0, "bytes_read": 0.0}
-    for entry in place.names(RunPaths(run).progress()):
-        told = json.loads(place.get(entry.name))
+    for name in place.names(RunPaths(run).progress()):
+        told = json.loads(place.get(name))
         for key in spent:
             spent[key] += float(told[key])
     return spent

@@ -31,6 +31,7 @@ class Schedule:
         self, plan: Plan, table: ShardTable, state: State, part: tuple[int, int] | None = None, again: bool = False
     ) -> None:
         self._plan, self._table, self._state = plan, table, state
+        self._numbers = {series: number for number, series in enumerate(table.series)}
         self._index, self._of = part or (0, 1)
         self._given_up = set() if again else set(state.failed)
         self._waiting_for: dict[int, int] = {}
@@ -70,7 +71,7 @@ class Schedule:
         return list(self._measuring(self._series(task))) if task.kind == "fold" else []
 
     def _series(self, task: Task) -> int:
-        return self._table.series.index(task.series)
+        return self._numbers[task.series]
 
     def _first_tasks(self) -> Iterator[Task]:
         for number, series in enumerate(self._table.series):

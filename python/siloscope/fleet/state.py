@@ -33,8 +33,8 @@ def state(place: Store, plan: Plan, table: ShardTable) -> State:
     found = State(np.zeros(shards, bool), np.zeros(shards, bool), np.zeros(series, bool))
     rows = _Rows(table)
     prefix = len(RunPaths(plan.run).commits())
-    for entry in place.names(plan.paths.commits()):
-        name = entry.name[prefix:].removesuffix(".json")
+    for commit in place.names(plan.paths.commits()):
+        name = commit[prefix:].removesuffix(".json")
         folder, _, base = name.rpartition("/")
         if base.endswith(FAILED):
             found.failed.add(name.removesuffix(FAILED))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Hashable, Iterator
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 from siloscope.errors import InputError
@@ -12,15 +11,6 @@ from siloscope.errors import InputError
 
 class Missing(InputError):
     """There is no object of this name."""
-
-
-@dataclass(frozen=True)
-class Entry:
-    """One object of a listing."""
-
-    name: str
-    size: int
-    """Bytes."""
 
 
 class Store(Hashable, Protocol):
@@ -57,8 +47,8 @@ class Store(Hashable, Protocol):
     def size(self, name: str) -> int | None:
         """Bytes of the object; None where there is none."""
 
-    def names(self, prefix: str) -> Iterator[Entry]:
-        """All objects below a prefix that ends at a ``/``, in no particular order."""
+    def names(self, prefix: str) -> Iterator[str]:
+        """The names of all objects below a prefix that ends at a ``/``, in no particular order."""
 
     def below(self, prefix: str) -> list[str]:
         """The names, without the prefix, of what lies directly below it."""
