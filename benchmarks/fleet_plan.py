@@ -107,7 +107,10 @@ def main() -> None:
     parser.add_argument("places", nargs="*", type=Path)
     given = parser.parse_args()
     if given.step:
-        {"make": make, "resume": resume}[given.step](*given.places)
+        if given.step == "make":
+            make(*given.places)
+        else:
+            resume(*given.places)
         say_usage()
         return
     with tempfile.TemporaryDirectory() as folder:
