@@ -69,7 +69,7 @@ def ended(process: subprocess.Popen[bytes], patience: float) -> None:
 def stamps(place: str) -> dict[str, int]:
     """When each committed object was written."""
     done = [json.loads(path.read_text()) for path in Path(place).glob("commits/**/*.json")]
-    names = [row["name"] for commit in done for row in commit["objects"]]
+    names = [row["name"] for commit in done for row in commit.get("objects", ())]
     return {name: (Path(place) / name).stat().st_mtime_ns for name in names}
 
 
