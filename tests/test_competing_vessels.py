@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,12 +26,12 @@ def true_camera(taken: Sample) -> siloscope.Camera:
 
 
 def answered(
-    folder: Path, kind: str, seed: int, vessels: str = "any", **known: object
+    folder: Path, kind: str, seed: int, vessels: str = "any", **known: Any
 ) -> tuple[Verdict, dict[str, object]]:
     taken = single(folder, kind, seed, 320)
     depth = taken.depth.astype(np.float32) * 1e-3
-    known = {"sensor": taken.truth["sensor"], "intrinsics": "exact", "vessels": vessels, **known}
-    answer = siloscope.locate(depth, true_camera(taken), **known).to_dict()
+    told = {"sensor": taken.truth["sensor"], "intrinsics": "exact", "vessels": vessels, **known}
+    answer = siloscope.locate(depth, true_camera(taken), **told).to_dict()
     return judge(answer, taken.truth), answer
 
 
@@ -81,7 +82,8 @@ def test_told_intrinsics_widen_the_deviations_but_not_the_relative_ones(tmp_path
 
 def down(kind: str, seed: int, folder: Path) -> np.ndarray:
     """Gravity's direction in the camera frame."""
-    return Pose(**single(folder, kind, seed, 320).truth["pose"]).rotation[2]
+    rotation: np.ndarray = Pose(**single(folder, kind, seed, 320).truth["pose"]).rotation
+    return np.asarray(rotation[2])
 
 
 @pytest.mark.parametrize("kind", ["horizon", "tank"])
@@ -103,7 +105,7 @@ def test_gravity_tells_which_end_of_a_bare_cylinder_is_down(seed: int, tmp_path:
 def test_gravity_out_of_the_cameras_back_is_no_pose(tmp_path: Path) -> None:
     taken = single(tmp_path, "horizon", 100, 320)
     camera = true_camera(taken)
-    gravity = tuple(down("horizon", 100, tmp_path).tolist())
+    gravity = down("horizon", 100, tmp_path)
     frame = siloscope.Frame(depth=taken.depth.astype(np.float32) * 1e-3, camera=camera, gravity=gravity)
     assert siloscope.locate(frame, sensor=taken.truth["sensor"]).reason == "above-horizon"
 
