@@ -12,6 +12,7 @@ import pytest
 
 from monitor import farm
 from monitor.farm import Farm
+from monitor.servers import eventually
 from siloscope.client import Client, ServiceError
 from siloscope.errors import InputError
 from siloscope.monitor.clock import CORRECTED, DAY, HOUR, MINUTE, SECOND, SUSPECT, SetClock
@@ -220,6 +221,24 @@ def test_a_hub_that_refuses_loses_nothing_and_says_why(hub: Farm, box: tuple[Far
         with service.store.read() as connection:
             assert sync.pending(connection) == {"hub": 1}
     assert rows(hub) == []
+
+
+def test_site_toml_makes_the_link_that_works_by_itself(hub: Farm, tmp_path: Path) -> None:
+    folder = tmp_path / "edge"
+    folder.mkdir()
+    (folder / "token").write_text(farm.token(hub, "edge"))
+    remark = {"code": "lens-film", "message": "a film", "severity": "warning", "advice": "clean it"}
+    with farm.listening(hub) as address:
+        link = f'hub = "{address}"\n[edge]\ntoken_file = "token"\n'
+        service = farm.make(folder, silos=link + farm.SILOS)
+        (edge,) = service.parts
+        edge.start()
+        farm.measured(service, service.clock.now(), quality=[remark])
+        (row,) = eventually(lambda: rows(hub))
+        edge.stop()
+        assert row.quality[0]["code"] == "lens-film"
+        client = Client(address, farm.token(hub, "read"))
+        assert client.now("silo7")["quality"][0]["code"] == "lens-film"
 
 
 def test_a_hub_needs_a_token_at_the_edge(tmp_path: Path) -> None:

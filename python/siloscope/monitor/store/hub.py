@@ -47,8 +47,7 @@ def take(store: Store, connection: Connection, box: str, told: dict[str, Any], n
         "clock": told["clock"],
         "calibration": told["calibration"] if known else None,
     }
-    surface = None if told["surface"] is None else base64.b64decode(told["surface"])
-    readings.add(connection, row, surface, now)
+    readings.add(connection, row, told["surface"], now)
     return str(camera.silo)
 
 

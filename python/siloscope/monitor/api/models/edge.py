@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Base64Bytes, Field
 
 from siloscope.monitor.api.models.base import Model
+from siloscope.monitor.api.models.contents import Remark
 from siloscope.monitor.api.models.people import Given
 
 Id = Annotated[str, Field(min_length=1, max_length=80)]
@@ -19,7 +20,7 @@ Amount = Annotated[float | None, Field(allow_inf_nan=False)]
 class EdgeValues(Given):
     """A reading's columns."""
 
-    status: Annotated[str, Field(max_length=12)]
+    status: Literal["ok", "refused"]
     reason: Text = None
     message: Text = None
     volume: Amount = None
@@ -42,7 +43,7 @@ class EdgeValues(Given):
     distance_min: Amount = None
     distance_max: Amount = None
     coverage: Amount = None
-    quality: Annotated[list[dict[str, Any]], Field(max_length=100)] = Field(default_factory=list)
+    quality: Annotated[list[Remark], Field(max_length=100)] = Field(default_factory=list)
 
 
 class EdgeReading(Given):
@@ -51,16 +52,16 @@ class EdgeReading(Given):
     camera: Id
     sha256: Sha256
     format: Annotated[str, Field(max_length=20)]
-    bytes: Annotated[int, Field(ge=0)]
+    bytes: Annotated[int, Field(ge=0, lt=1 << 31)]
     time: Micros
     clock: Literal["good", "corrected", "suspect"]
     current: bool = Field(description="Whether its time is by the clock that `sent` is by.")
-    run: int
+    run: Annotated[int, Field(ge=0, lt=1 << 53)]
     run_version: Annotated[str, Field(max_length=40)]
     run_config: Annotated[str, Field(max_length=64)]
     calibration: Annotated[str | None, Field(max_length=36)]
     values: EdgeValues
-    surface: Annotated[str | None, Field(max_length=100_000, description="Base64.")]
+    surface: Annotated[Base64Bytes | None, Field(max_length=100_000)]
 
 
 class EdgeReadings(Given):
@@ -84,7 +85,7 @@ class EdgeCalibration(Given):
     camera: Id
     origin: Annotated[str, Field(max_length=20)]
     state: Literal["confirmed", "proposed", "rejected"]
-    frames: Annotated[int, Field(ge=0)]
+    frames: Annotated[int, Field(ge=0, lt=1 << 31)]
     valid_from: Micros
     valid_to: Micros | None
     confirmed_by: Text
