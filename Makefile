@@ -123,12 +123,15 @@ format: $(VENV)/.installed ## formats all code
 clean: ## removes what was built, but not .venv
 	rm -rf target build dist site demo
 
-.PHONY: results peers services
+.PHONY: results peers services monitor-proof
 
-SERVICES := mosquitto mbpoll prometheus nginx-light
+SERVICES := postgresql-15 mosquitto mbpoll prometheus nginx-light
 
 services: ## installs the servers and clients that the service is tested with (Debian, as root); without them those tests are skipped
 	apt-get install -y --no-install-recommends $(SERVICES)
+
+monitor-proof: build ## kills the service 100 times and cuts its power 20 times under senders; about half an hour
+	cd tests && ../$(BIN)/python -m monitor.hardships --kills 100 --frames 10000 --cuts 20
 
 results: build ## repeats the paper's evaluation and writes docs/results.md
 	$(BIN)/siloscope reproduce all --out docs

@@ -51,10 +51,11 @@ class Server:
     options: tuple[str, ...] = ()
     env: dict[str, str] = field(default_factory=dict)
     root: str = ""
+    module: tuple[str, ...] = ("siloscope",)
     process: subprocess.Popen[str] | None = None
 
     def start(self) -> Server:
-        command = [sys.executable, "-m", "siloscope", "serve", "--data", str(self.data), "--bind", "127.0.0.1:0"]
+        command = [sys.executable, "-m", *self.module, "serve", "--data", str(self.data), "--bind", "127.0.0.1:0"]
         command += [] if self.site is None else ["--site", str(self.site)]
         log = (self.data.parent / f"{self.data.name}.log").open("a")
         self.process = subprocess.Popen(

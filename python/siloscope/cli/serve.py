@@ -35,7 +35,9 @@ def serve(
         str, typer.Option("--bind", metavar="HOST:PORT", help="Where to listen; port 0 takes a free one.")
     ] = "127.0.0.1:8480",
     database: Database = None,
-    workers: Annotated[int, typer.Option(min=1, max=64, help="Measuring processes.")] = 1,
+    workers: Annotated[
+        int, typer.Option(min=0, max=64, help="Measuring processes; 0 leaves it to another service of the database.")
+    ] = 1,
     demo: Annotated[bool, typer.Option("--demo", help="A simulated farm, with two years of history.")] = False,
     as_json: options.AsJson = False,
 ) -> int:

@@ -53,7 +53,8 @@ class Calibrating:
         self._stopping.set()
         self._wake.set()
         self._process.stop()
-        self._thread.join(5)
+        if self._thread.is_alive():
+            self._thread.join(5)
 
     def _work(self) -> None:
         while not self._stopping.is_set():

@@ -109,8 +109,9 @@ class Service:
 
     def start(self) -> None:
         """Starts workers and the beat."""
-        self.measuring.start(self.settings.workers)
-        self.calibrating.start()
+        if self.settings.workers:
+            self.measuring.start(self.settings.workers)
+            self.calibrating.start()
         thread = threading.Thread(target=self._run, name="beat", daemon=True)
         thread.start()
         self._threads.append(thread)

@@ -1,0 +1,50 @@
+"""Servers that break their word, so that the tests of the word can fail."""
+
+from __future__ import annotations
+
+import os
+import sys
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+from siloscope.cli import main
+from siloscope.monitor.store import engine, frames
+from siloscope.monitor.store.engine import new_id
+
+
+def acknowledge_first() -> None:
+    """Frames are recorded a moment after they were acknowledged."""
+    record, promised = frames.record, threading.local()
+    frames.__dict__["new_id"] = lambda: promised.id
+
+    def later(store: Any, arrival: Any, there: Callable[[], bool]) -> tuple[str, bool]:
+        key = new_id()
+
+        def work() -> None:
+            time.sleep(0.2)
+            promised.id = key
+            record(store, arrival, there)
+
+        threading.Thread(target=work, daemon=True).start()
+        return key, True
+
+    frames.__dict__["record"] = later
+
+
+def no_flush() -> None:
+    """Nothing is flushed to the disk."""
+    os.fsync = lambda _file: None
+    durable = engine.__dict__["_durable_file"]
+
+    def careless(connection: Any, record: Any) -> None:
+        durable(connection, record)
+        connection.execute("PRAGMA synchronous=OFF")
+
+    engine.__dict__["_durable_file"] = careless
+
+
+if __name__ == "__main__":
+    {"acknowledge-first": acknowledge_first, "no-flush": no_flush}[sys.argv[1]]()
+    sys.exit(main(sys.argv[2:]))
