@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import http.client
 import json
 import ssl
 import urllib.error
@@ -147,7 +148,7 @@ class Client:
                 return answer.status, json.load(answer)
         except urllib.error.HTTPError as error:
             raise _refused(error) from None
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, http.client.HTTPException) as error:
             reason = getattr(error, "reason", error)
             raise ServiceError(f"{self._root}: no answer ({reason}); is it running", None, "unreachable") from None
 

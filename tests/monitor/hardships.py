@@ -8,6 +8,7 @@ from __future__ import annotations
 import argparse
 import contextlib
 import hashlib
+import http.client
 import json
 import os
 import random
@@ -77,7 +78,7 @@ class Senders:
         except urllib.error.HTTPError as error:
             self.refused.append(error.code)
             return False
-        except (OSError, ValueError):
+        except (OSError, ValueError, http.client.HTTPException):
             return False
 
 

@@ -46,6 +46,7 @@ COMMANDS: tuple[Command, ...] = (
     Command("pack", "pack:pack", "Seal frames in Zarr shards beside a manifest, for many machines."),
     Command("fleet", "fleet:fleet", "Measure many sealed frames on many machines: plan, run, compare, publish."),
     Command("serve", "serve:serve", "Serve a site: frames in, readings, alerts, the page out."),
+    Command("send", "send:send", "Send frames to a service, each until it is on its disk."),
     Command("monitor", "monitor:monitor", "Look after a service's data: tokens, users, backup, restore, check."),
     Command("simulate", "simulate:simulate", "Write depth frames of a simulated silo, with their exact truth."),
 )

@@ -13,6 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
+from starlette.routing import Match
 
 from siloscope import _core
 from siloscope.monitor.api import (
@@ -38,6 +39,8 @@ from siloscope.monitor.service import Service
 from siloscope.monitor.throttle import Throttle
 
 PREFIX = "/api/v1"
+
+PAGES = "/{path:path}"
 
 PAGE = Path(__file__).parents[1] / "page"
 
@@ -118,15 +121,26 @@ def _refuse_plainly(app: FastAPI) -> None:
         return problem(Problem("invalid", f"'{place}': {first['msg']}"))
 
     @app.exception_handler(HTTPException)
-    async def http(_request: Request, error: HTTPException) -> JSONResponse:
-        slug = STATUS_SLUGS.get(error.status_code, "invalid")
-        return problem(Problem(slug, str(error.detail), dict(error.headers or {})))
+    async def http(request: Request, error: HTTPException) -> JSONResponse:
+        slug, headers = STATUS_SLUGS.get(error.status_code, "invalid"), dict(error.headers or {})
+        if slug == "method-not-allowed":
+            headers["Allow"] = ", ".join(sorted(_methods(app, request)))
+        return problem(Problem(slug, str(error.detail), headers))
 
     @app.exception_handler(OperationalError)
     async def database(request: Request, error: OperationalError) -> JSONResponse:
         if is_full(error):
             return problem(full(request.app.state.service.blobs))
         return problem(Problem("unavailable", "the database can't be reached or is busy", {"Retry-After": "5"}))
+
+
+def _methods(app: FastAPI, request: Request) -> set[str]:
+    """The methods of an address, from all routes but the page's, which takes every address."""
+    found: set[str] = set()
+    for route in app.routes:
+        if route.matches(request.scope)[0] is not Match.NONE and getattr(route, "path", "") != PAGES:
+            found |= getattr(route, "methods", None) or set()
+    return found or {"GET"}
 
 
 async def _with_headers(request: Request, call: Callable[[Request], Awaitable[Response]]) -> Response:
@@ -141,7 +155,7 @@ async def _with_headers(request: Request, call: Callable[[Request], Awaitable[Re
 def _serve_page(app: FastAPI) -> None:
     """The built page: files by name, and its index for every address that is no file."""
 
-    @app.get("/{path:path}", include_in_schema=False)
+    @app.get(PAGES, include_in_schema=False)
     def page(path: str) -> Response:
         if path.startswith(("api/", "metrics", "healthz", "readyz")):
             raise Problem("not-found", f"there is nothing at '/{path[:100]}'")

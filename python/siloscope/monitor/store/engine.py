@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import secrets
+import sqlite3
 import threading
 import time
 from collections.abc import Iterator
@@ -16,7 +17,7 @@ from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, Engine, Table, create_engine, event, text
 from sqlalchemy.dialects import postgresql, sqlite
-from sqlalchemy.exc import ArgumentError, OperationalError
+from sqlalchemy.exc import ArgumentError, DatabaseError, OperationalError
 
 from siloscope import _core
 from siloscope.errors import InputError, UsageError
@@ -77,8 +78,14 @@ class Store:
     def insert_new(self, connection: Connection, table: Table, row: dict[str, Any]) -> bool:
         """Inserts a row unless one with its unique key is there; whether it was inserted."""
         dialect: Any = sqlite if self.is_sqlite else postgresql
-        made = connection.execute(dialect.insert(table).values(**row).on_conflict_do_nothing())
-        return made.rowcount == 1
+        key = next(iter(table.primary_key.columns))
+        made = dialect.insert(table).values(**row).on_conflict_do_nothing().returning(key)
+        return connection.execute(made).scalar() is not None
+
+    def vacuum_into(self, path: Path) -> None:
+        """Writes an SQLite database as it is at this moment to a new file."""
+        with contextlib.closing(sqlite3.connect(self.url.removeprefix("sqlite:///"), isolation_level=None)) as file:
+            file.execute("VACUUM INTO ?", (str(path),))
 
     def close(self) -> None:
         """Closes all connections."""
@@ -125,8 +132,7 @@ def _keep_before(store: Store, revision: str) -> None:
     path = Path(store.url.removeprefix("sqlite:///"))
     kept = path.with_name(f"{path.stem}.before-{revision}.db")
     if not kept.exists():
-        with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
-            connection.exec_driver_sql("VACUUM INTO ?", (str(kept),))
+        store.vacuum_into(kept)
 
 
 def revision_of(store: Store) -> str | None:
@@ -186,11 +192,16 @@ def whole(connection: Connection) -> list[str]:
     """What is wrong with a SQLite file; nothing where it is whole."""
     if connection.dialect.name != "sqlite":
         return []
-    found = [str(row[0]) for row in connection.execute(text("PRAGMA integrity_check"))]
+    try:
+        found = [str(row[0]) for row in connection.execute(text("PRAGMA integrity_check"))]
+    except DatabaseError as error:
+        return [str(error.orig)]
+    if found != ["ok"]:
+        return found
     broken = [
         f"row {row[1]} of {row[0]} points nowhere" for row in connection.execute(text("PRAGMA foreign_key_check"))
     ]
-    return [line for line in found if line != "ok"] + broken
+    return broken
 
 
 def new_id() -> str:

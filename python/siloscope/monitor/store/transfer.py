@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from sqlalchemy import Connection, Table, func, insert, select, text
+from sqlalchemy.exc import DatabaseError
 
 from siloscope.errors import InputError, UsageError
 from siloscope.monitor.store import schema_people
@@ -28,8 +29,7 @@ def write_file(store: Store, path: Path) -> int:
     part.unlink(missing_ok=True)
     try:
         if store.is_sqlite:
-            with store.engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
-                connection.exec_driver_sql("VACUUM INTO ?", (str(part),))
+            store.vacuum_into(part)
         else:
             target = opened(f"sqlite:///{part.absolute()}")
             copy(store, target)
@@ -58,9 +58,12 @@ def read_file(path: Path) -> Store:
     with path.open("rb") as file:
         if file.read(16) != b"SQLite format 3\x00":
             raise InputError(f"{path}: is no backup of `siloscope monitor backup`")
-    store = opened(f"sqlite:///{path.absolute()}")
-    with store.read() as connection:
-        wrong = whole(connection)
+    try:
+        store = opened(f"sqlite:///{path.absolute()}")
+        with store.read() as connection:
+            wrong = whole(connection)
+    except DatabaseError as error:
+        wrong = [str(error.orig)]
     if wrong:
         raise InputError(f"{path}: the backup is damaged ({wrong[0]}); take another one")
     return store
