@@ -81,8 +81,8 @@ def backup(data: Path, database: str | None, file: Path) -> Answer:
 def restore(data: Path, database: str | None, file: Path) -> Answer:
     """Puts a backup in place of the database; what was there is kept beside it."""
     data.mkdir(parents=True, exist_ok=True)
-    lock = Lock(data / "lock")
     source = transfer.read_file(file)
+    lock = Lock(data / "lock")
     try:
         if database is not None:
             target = opened(database)

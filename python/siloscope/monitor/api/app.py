@@ -13,7 +13,7 @@ from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse
 from sqlalchemy.exc import OperationalError
 from starlette.exceptions import HTTPException
-from starlette.routing import Match
+from starlette.routing import Route
 
 from siloscope import _core
 from siloscope.monitor.api import (
@@ -124,7 +124,7 @@ def _refuse_plainly(app: FastAPI) -> None:
     async def http(request: Request, error: HTTPException) -> JSONResponse:
         slug, headers = STATUS_SLUGS.get(error.status_code, "invalid"), dict(error.headers or {})
         if slug == "method-not-allowed":
-            headers["Allow"] = ", ".join(sorted(_methods(app, request)))
+            headers["Allow"] = ", ".join(sorted(_methods(request.url.path)))
         return problem(Problem(slug, str(error.detail), headers))
 
     @app.exception_handler(OperationalError)
@@ -134,12 +134,13 @@ def _refuse_plainly(app: FastAPI) -> None:
         return problem(Problem("unavailable", "the database can't be reached or is busy", {"Retry-After": "5"}))
 
 
-def _methods(app: FastAPI, request: Request) -> set[str]:
+def _methods(path: str) -> set[str]:
     """The methods of an address, from all routes but the page's, which takes every address."""
     found: set[str] = set()
-    for route in app.routes:
-        if route.matches(request.scope)[0] is not Match.NONE and getattr(route, "path", "") != PAGES:
-            found |= getattr(route, "methods", None) or set()
+    for prefix, router in (*((PREFIX, one) for one in ROUTERS), ("", health.outside)):
+        for route in router.routes:
+            if isinstance(route, Route) and path.startswith(prefix) and route.path_regex.match(path[len(prefix) :]):
+                found |= route.methods or set()
     return found or {"GET"}
 
 

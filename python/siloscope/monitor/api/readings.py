@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator
-from datetime import datetime
 from importlib import import_module
 from typing import Annotated, Any, Literal
 
@@ -13,7 +12,7 @@ from fastapi import APIRouter, Query
 from fastapi.responses import Response, StreamingResponse
 
 from siloscope.monitor.api import models, views
-from siloscope.monitor.api.context import After, Count, Reading, ServiceOf, SiloOf, micros_of, refusals
+from siloscope.monitor.api.context import After, Count, Reading, ServiceOf, SiloOf, Time, micros_of, refusals
 from siloscope.monitor.clock import DAY, SECOND, iso
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.service import Service
@@ -61,8 +60,8 @@ def get_readings(
     silo: SiloOf,
     connection: Reading,
     service: ServiceOf,
-    since: Annotated[datetime | None, Query(alias="from", description="First time.")] = None,
-    until: Annotated[datetime | None, Query(alias="to", description="Time behind the last one.")] = None,
+    since: Annotated[Time | None, Query(alias="from", description="First time.")] = None,
+    until: Annotated[Time | None, Query(alias="to", description="Time behind the last one.")] = None,
     buckets: Annotated[int | None, Query(ge=1, le=MOST_BUCKETS, description="Means over so many stretches.")] = None,
     format: Literal["json", "csv", "parquet"] = "json",
     after: After = None,

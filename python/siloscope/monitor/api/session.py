@@ -20,7 +20,7 @@ router = APIRouter(tags=["session"])
 
 def _session(person: Person) -> models.Session:
     role: Any = person.highest
-    grants: list[Any] = list(person.grants)
+    grants: list[Any] = [{"place": place, "role": one} for place, one in person.grants]
     return models.Session(person=person.name, kind=person.kind, role=role, grants=grants)
 
 

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query
 
 from siloscope.monitor import access, surfaces
 from siloscope.monitor.api import models, views
-from siloscope.monitor.api.context import After, Count, PersonOf, Reading, ServiceOf, SiloOf, micros_of, refusals
+from siloscope.monitor.api.context import After, Count, PersonOf, Reading, ServiceOf, SiloOf, Time, micros_of, refusals
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.store import places, readings
 
@@ -55,7 +54,7 @@ def get_surface(
     silo: SiloOf,
     connection: Reading,
     service: ServiceOf,
-    at: Annotated[datetime | None, Query(description="The newest surface up to this time; now unless given.")] = None,
+    at: Annotated[Time | None, Query(description="The newest surface up to this time; now unless given.")] = None,
 ) -> models.Surface:
     """The content's surface at a time, on 32 x 32 cells."""
     if silo.percent_only:
@@ -96,8 +95,8 @@ def _vessel(document: dict[str, Any] | None, told: dict[str, Any], row: Any) -> 
 def get_events(
     silo: SiloOf,
     connection: Reading,
-    since: Annotated[datetime | None, Query(alias="from")] = None,
-    until: Annotated[datetime | None, Query(alias="to")] = None,
+    since: Annotated[Time | None, Query(alias="from")] = None,
+    until: Annotated[Time | None, Query(alias="to")] = None,
     after: After = None,
     count: Count = 500,
 ) -> models.Page[models.Event]:

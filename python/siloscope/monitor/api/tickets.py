@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-from datetime import datetime
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request
 
 from siloscope.monitor import access
 from siloscope.monitor.api import models, views
-from siloscope.monitor.api.context import PersonOf, Reading, ServiceOf, SiloOf, address_of, micros_of, need, refusals
+from siloscope.monitor.api.context import (
+    PersonOf,
+    Reading,
+    ServiceOf,
+    SiloOf,
+    Time,
+    address_of,
+    micros_of,
+    need,
+    refusals,
+)
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.store import people, tickets
 from siloscope.monitor.store.readings import Span
@@ -28,8 +37,8 @@ def _ticket(row: Any) -> models.Ticket:
 def get_tickets(
     silo: SiloOf,
     connection: Reading,
-    since: Annotated[datetime | None, Query(alias="from")] = None,
-    until: Annotated[datetime | None, Query(alias="to")] = None,
+    since: Annotated[Time | None, Query(alias="from")] = None,
+    until: Annotated[Time | None, Query(alias="to")] = None,
 ) -> models.Page[models.Ticket]:
     """Tickets in the order of their times."""
     if silo.percent_only:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from datetime import datetime
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from siloscope.monitor.api.models.base import Model
 
@@ -17,6 +17,15 @@ class Given(BaseModel):
     """What is sent; entries that are not known are a mistake."""
 
     model_config = ConfigDict(extra="forbid")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_truth_for_a_number(cls, sent: Any) -> Any:
+        for name, value in sent.items() if isinstance(sent, dict) else ():
+            field = cls.model_fields.get(name)
+            if isinstance(value, bool) and field is not None and "bool" not in str(field.annotation):
+                raise ValueError(f"'{name}' must not be true or false")
+        return sent
 
 
 class SignIn(Given):
@@ -43,13 +52,20 @@ class Grant(Model):
     role: Role
 
 
+class RoleAt(Model):
+    """A role on a place; null is everywhere."""
+
+    place: str | None
+    role: Role
+
+
 class Session(Model):
     """Who is signed in."""
 
     person: str
     kind: Literal["user", "token", "local"]
     role: Role | None
-    grants: list[tuple[str | None, Role]]
+    grants: list[RoleAt]
 
 
 class User(Model):
