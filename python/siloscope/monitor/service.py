@@ -17,6 +17,7 @@ from siloscope.monitor.calibrating import Calibrating
 from siloscope.monitor.clock import DAY, Clock, SystemClock
 from siloscope.monitor.intake import Intake
 from siloscope.monitor.lock import Lock
+from siloscope.monitor.looking import Looking
 from siloscope.monitor.measuring import Measuring
 from siloscope.monitor.outbox import Outbox
 from siloscope.monitor.outlets import Outlets
@@ -70,6 +71,7 @@ class Service:
             self.store, self.blobs, self.files, settings.limits, self.clock, self.changed, settings.idle_s
         )
         self.calibrating = Calibrating(self.store, self.blobs, settings.limits, self.clock, self.measuring.wake)
+        self.looking = Looking(settings.limits, settings.idle_s)
         self._stories, self._alerting = Storyteller(self.store), Alerting(self.store, self.outbox)
         self._keeper = Keeper(self.store, self.blobs, settings.limits, settings.retention, self.clock)
         self._dirty: dict[str, int] = {}
@@ -125,6 +127,7 @@ class Service:
         self._stopping.set()
         self.measuring.stop()
         self.calibrating.stop()
+        self.looking.stop()
         for thread in self._threads:
             thread.join(5)
         self.store.close()
@@ -196,6 +199,7 @@ class Service:
 
     def tick(self) -> None:
         """Rules of all silos, for what has not come."""
+        self.looking.rest()
         with self.store.read() as connection:
             silos = [row.id for row in places.listed(connection, "silo")]
             before = changes.newest(connection)

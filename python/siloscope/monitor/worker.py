@@ -17,7 +17,7 @@ from functools import lru_cache
 from multiprocessing.connection import Connection
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeAlias
 
 
 @dataclass(frozen=True)
@@ -55,6 +55,14 @@ class CalibrateJob:
 
 
 @dataclass(frozen=True)
+class LookJob:
+    """One frame to be looked at, without a calibration."""
+
+    path: Path
+    camera: CameraSettings
+
+
+@dataclass(frozen=True)
 class Measured:
     """A reading without what the service knows of it."""
 
@@ -74,10 +82,24 @@ class Calibrated:
 
 
 @dataclass(frozen=True)
+class Looked:
+    """What one frame shows."""
+
+    pose: dict[str, Any]
+    """``status``, ``reason``, ``message``, ``r_x``, ``r_y``, ``t_x``, ``t_y`` and ``std`` of `siloscope.locate`."""
+    picture: bytes | None
+    """PNG; None for a cloud."""
+
+
+@dataclass(frozen=True)
 class Unusable:
     """What was wrong with the input, in a sentence."""
 
     message: str
+
+
+Job: TypeAlias = MeasureJob | CalibrateJob | LookJob
+"""What a worker is asked for."""
 
 
 def serve(pipe: Connection, memory: int) -> None:
@@ -93,13 +115,12 @@ def serve(pipe: Connection, memory: int) -> None:
         return
 
 
-def answer(job: MeasureJob | CalibrateJob) -> Measured | Calibrated | Unusable:
+def answer(job: Job) -> Measured | Calibrated | Looked | Unusable:
     """The work of one job; input that can't be used is an answer too."""
     from siloscope.errors import SiloscopeError
 
-    work: Callable[[Any], Measured | Calibrated] = measured if isinstance(job, MeasureJob) else calibrated
     try:
-        return work(job)
+        return WORK[type(job)](job)
     except SiloscopeError as error:
         return Unusable(str(error))
     except MemoryError:
@@ -126,6 +147,25 @@ def calibrated(job: CalibrateJob) -> Calibrated:
     frames = (_frame(path, job.camera) for path in job.paths)
     found = calibrate(frames, sensor=job.camera.sensor, diameter=told.get("diameter"), bottom=told.get("bottom"))
     return Calibrated(found.to_dict(), found.ok, found.message)
+
+
+def looked(job: LookJob) -> Looked:
+    """Reads one frame, draws it, and finds the pose that it shows alone."""
+    from siloscope.locate import locate
+    from siloscope.monitor.picture import drawn
+
+    frame = _frame(job.path, job.camera)
+    found = locate(frame, sensor=job.camera.sensor, ratios=False).to_dict()
+    names = ("status", "reason", "message", "r_x", "r_y", "t_x", "t_y", "std")
+    return Looked({name: found.get(name) for name in names}, drawn(frame))
+
+
+WORK: dict[type, Callable[[Any], Measured | Calibrated | Looked]] = {
+    MeasureJob: measured,
+    CalibrateJob: calibrated,
+    LookJob: looked,
+}
+"""What is done for a job."""
 
 
 def _frame(path: Path, camera: CameraSettings) -> Any:

@@ -30,7 +30,7 @@ class Process:
         self._process: Any = None
         self.used = time.monotonic()
 
-    def answer(self, job: worker.MeasureJob | worker.CalibrateJob, seconds: float) -> Any:
+    def answer(self, job: worker.Job, seconds: float) -> Any:
         """The answer of a job; raises `Lost` where the process ends or takes longer."""
         pipe = self._started()
         try:

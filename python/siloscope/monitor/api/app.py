@@ -7,6 +7,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
@@ -23,6 +24,7 @@ from siloscope.monitor.api import (
     edge,
     frames,
     health,
+    looking,
     models,
     people,
     readings,
@@ -45,8 +47,9 @@ PAGES = "/{path:path}"
 PAGE = Path(__file__).parents[1] / "page"
 
 ROUTERS = (
-    *(silos.router, readings.router, frames.router, alerts.router, rules.router, calibrations.router, tickets.router),
-    *(settings.router, session.router, people.router, deliveries.router, edge.router, stream.router, health.router),
+    *(silos.router, readings.router, frames.router, looking.router, alerts.router, rules.router, calibrations.router),
+    *(tickets.router, settings.router, session.router, people.router, deliveries.router, edge.router),
+    *(stream.router, health.router),
 )
 
 HEADERS = {
@@ -155,6 +158,11 @@ async def _with_headers(request: Request, call: Callable[[Request], Awaitable[Re
 
 def _serve_page(app: FastAPI) -> None:
     """The built page: files by name, and its index for every address that is no file."""
+
+    @app.get("/install/{camera}", include_in_schema=False)
+    def install(camera: str) -> Response:
+        """The installer's view; the address is relative, so that it holds below any path."""
+        return Response(status_code=307, headers={"Location": f"../#/install/{quote(camera, safe='')}"})
 
     @app.get(PAGES, include_in_schema=False)
     def page(path: str) -> Response:

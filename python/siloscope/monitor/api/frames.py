@@ -33,6 +33,7 @@ from siloscope.monitor.intake import Told
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.service import Service
 from siloscope.monitor.store import frames, places
+from siloscope.monitor.store.rows import Record
 
 router = APIRouter(tags=["frames"])
 
@@ -138,7 +139,8 @@ def _length(request: Request) -> int | None:
     return int(told) if told.isdigit() else None
 
 
-def _seen(connection: Reading, person: Person, frame: str) -> object:
+def seen(connection: Reading, person: Person, frame: str) -> Record:
+    """A frame that who asks may see; raises `Problem`."""
     row = frames.get(connection, frame)
     if row is not None and person.camera == row.camera:
         return row
@@ -168,7 +170,7 @@ def get_frames(
 @router.get("/frames/{frame}", response_model=models.Frame, responses=refusals("not-found"))
 def get_frame(frame: str, connection: Reading, person: PersonOf) -> models.Frame:
     """A frame and what became of it."""
-    return views.frame(connection, _seen(connection, person, frame))
+    return views.frame(connection, seen(connection, person, frame))
 
 
 @router.get(
@@ -181,7 +183,7 @@ def get_frame(frame: str, connection: Reading, person: PersonOf) -> models.Frame
 )
 def get_content(frame: str, connection: Reading, person: PersonOf, service: ServiceOf) -> Response:
     """The frame's bytes as they were sent."""
-    row: object = _seen(connection, person, frame)
+    row: object = seen(connection, person, frame)
     sha256 = str(getattr(row, "sha256"))  # noqa: B009
     path = service.blobs.path(sha256)
     if not path.exists():

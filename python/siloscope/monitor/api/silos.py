@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+from typing import Annotated
 
 from fastapi import APIRouter, Query
 
 from siloscope.monitor import access, surfaces
-from siloscope.monitor.api import models, views
+from siloscope.monitor.api import models, vessels, views
 from siloscope.monitor.api.context import After, Count, PersonOf, Reading, ServiceOf, SiloOf, Time, micros_of, refusals
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.store import places, readings
@@ -31,7 +31,12 @@ def get_silos(connection: Reading, person: PersonOf, service: ServiceOf) -> mode
 def _for(silo: models.Silo, role: str) -> models.Silo:
     if role != "percent":
         return silo
-    hidden = {"now": views.only_percent(silo.now), "forecast": views.only_percent(silo.forecast), "vessel": {}}
+    hidden = {
+        "now": views.only_percent(silo.now),
+        "forecast": views.only_percent(silo.forecast),
+        "vessel": {},
+        "drawn": None,
+    }
     return silo.model_copy(update=hidden)
 
 
@@ -63,32 +68,14 @@ def get_surface(
     row = readings.surface_at(connection, silo.row.id, service.clock.now() if time is None else time)
     if row is None:
         raise Problem("not-found", f"there is no surface of '{silo.row.id}' up to then")
-    calibration = None if row.calibration is None else places.calibration_get(connection, row.calibration)
-    document = None if calibration is None else places.document(calibration)
     return models.Surface(
         silo=silo.row.id,
         time=views.at(row.time),
         reading=row.id,
         height_datum=row.datum,
-        vessel=_vessel(document, silo.row.vessel, row),
+        vessel=vessels.vessel(connection, silo.row.vessel, row),
         **surfaces.unpacked(row.blob),
     )
-
-
-def _vessel(document: dict[str, Any] | None, told: dict[str, Any], row: Any) -> models.Vessel:
-    """What the vessel is drawn from: the calibration's lengths, and what was told of it."""
-    seen = {} if document is None else document["silo"]
-    radius = seen.get("radius") or (told["diameter"] / 2.0 if told.get("diameter") else None)
-    bottom, apex = seen.get("cylinder_bottom"), seen.get("apex")
-    top = told.get("top")
-    if bottom is None and top is not None and told.get("cylinder") is not None:
-        bottom = top + told["cylinder"]
-    if apex is None and bottom is not None and told.get("cone") is not None:
-        apex = bottom + told["cone"]
-    kind = told.get("bottom") or ("cone" if apex is not None else None)
-    datum = None if row.distance is None or row.level is None else row.distance + row.level
-    lengths = {"radius_m": radius, "top_z_m": top, "cylinder_bottom_z_m": bottom, "bottom_z_m": apex}
-    return models.Vessel(**lengths, bottom=kind, datum_z_m=datum)
 
 
 @router.get("/silos/{silo}/events", response_model=models.Page[models.Event], responses=refusals("not-found"))

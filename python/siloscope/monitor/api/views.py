@@ -7,7 +7,7 @@ from typing import Any, Literal
 from sqlalchemy import Connection
 
 from siloscope.monitor import rules
-from siloscope.monitor.api import models
+from siloscope.monitor.api import models, vessels
 from siloscope.monitor.clock import SECOND, moment
 from siloscope.monitor.store import alerts, frames, places, readings
 
@@ -183,6 +183,7 @@ def silo(connection: Connection, row: Any, cameras: list[Any], role: str, time: 
     return models.Silo(
         **{name: getattr(row, name) for name in names},
         vessel=row.vessel,
+        drawn=vessels.vessel(connection, row.vessel, told),
         zone=places.zone_of(connection, row.place),
         role=role,
         now=now(connection, row, cameras, time),

@@ -25,7 +25,7 @@ from siloscope.monitor.api.models.edge import (
     EdgeSettings,
     EdgeTaken,
 )
-from siloscope.monitor.api.models.frames import Frame, FrameTaken
+from siloscope.monitor.api.models.frames import Frame, FrameTaken, Pose
 from siloscope.monitor.api.models.people import (
     AuditLine,
     Grant,
@@ -92,6 +92,7 @@ __all__ = [
     "Page",
     "Place",
     "PlaceChange",
+    "Pose",
     "Problem",
     "Product",
     "ProductChange",

@@ -17,6 +17,32 @@ class FrameTaken(Model):
     frame: str
 
 
+class PoseStd(Model):
+    """Standard deviations of a pose."""
+
+    r_x: float | None
+    r_y: float | None
+    t_x: float | None
+    t_y: float | None
+
+
+class Pose(Model):
+    """How a camera hangs in its silo, by its newest frame alone: numbers of `siloscope.locate`, radians and metres."""
+
+    camera: str
+    silo: str
+    frame: str | None = Field(default=None, description="null where no frame has come yet.")
+    time: datetime | None = None
+    status: Literal["ok", "refused"] | None = None
+    reason: str | None = None
+    message: str | None = None
+    r_x: float | None = None
+    r_y: float | None = None
+    t_x: float | None = None
+    t_y: float | None = None
+    std: PoseStd | None = None
+
+
 class Frame(Model):
     """A frame and what became of it."""
 

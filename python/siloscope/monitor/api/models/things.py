@@ -8,7 +8,7 @@ from typing import Literal
 from pydantic import Field
 
 from siloscope.monitor.api.models.base import Model
-from siloscope.monitor.api.models.contents import CameraState, Forecast, Now
+from siloscope.monitor.api.models.contents import CameraState, Forecast, Now, Vessel
 
 
 class Place(Model):
@@ -53,7 +53,8 @@ class Silo(Model):
     place: str | None
     product: str | None
     banner: str | None
-    vessel: dict[str, str | float | None]
+    vessel: dict[str, str | float | None] = Field(description="Lengths as they were told.")
+    drawn: Vessel | None = Field(description="What the silo is drawn from; null for who sees percent only.")
     stale_after_s: int
     modbus_unit: int | None
     serial: int | None
