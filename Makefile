@@ -1,9 +1,11 @@
-# Everything is installed into .venv from the package registries alone: Python >= 3.11, cargo, make and a C compiler do.
+# Everything is installed into .venv from the package registries alone: Python >= 3.11, cargo, make and a C compiler do; for the page Node.js and npm.
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 SOURCES := $(shell find crates -name '*.rs' -o -name 'Cargo.toml') Cargo.toml Cargo.lock pyproject.toml
 PYTHON_FILES := python tests examples benchmarks docs .ci
+PAGE := python/siloscope/monitor/page
+WEB := $(filter-out web/node_modules/%,$(wildcard web/* web/.npmrc web/public/*)) $(shell find web/src -type f)
 
 export VIRTUAL_ENV := $(CURDIR)/$(VENV)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
@@ -13,14 +15,14 @@ export NO_MKDOCS_2_WARNING := 1
 
 .DEFAULT_GOAL := help
 .PHONY: help setup build build-dev demo test check style lint types deny rustdoc rust-test python-test coverage bench golden \
-	golden-renew fleet-proof fuzz docs images dist wheels third-party requirements hooks release format clean
+	golden-renew fleet-proof fuzz docs images page page-images page-types page-check dist wheels third-party requirements hooks release format clean
 
 help: ## shows this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "  make %-13s %s\n", $$1, $$2}'
 
 setup: build ## builds and installs everything into .venv
 
-build: $(VENV)/.built
+build: $(VENV)/.built $(PAGE)/index.html
 
 $(VENV)/.installed: requirements/dev.txt
 	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "siloscope needs Python 3.11 or newer; name one: make PYTHON=python3.12")'
@@ -31,6 +33,22 @@ $(VENV)/.installed: requirements/dev.txt
 $(VENV)/.built: $(VENV)/.installed $(SOURCES)
 	$(BIN)/maturin develop --release -q
 	touch $@
+
+page: $(PAGE)/index.html ## builds the page of `siloscope serve`; needs Node.js 20.19 or newer and npm
+
+$(PAGE)/index.html: web/node_modules/.installed $(WEB)
+	npm run --silent --prefix web build -- --logLevel warn
+
+web/node_modules/.installed: web/package-lock.json
+	npm ci --silent --prefix web
+	touch $@
+
+page-types: $(VENV)/.installed ## writes the page's types from the service's OpenAPI document
+	$(BIN)/python .ci/page_types.py
+
+page-check: web/node_modules/.installed build ## formats, lint, types and small tests of the page
+	npm run --silent --prefix web check
+	$(BIN)/python .ci/page_types.py --check
 
 build-dev: $(VENV)/.installed ## builds quickly while developing; the next `make build` makes the release again
 	rm -f $(VENV)/.built
@@ -50,7 +68,7 @@ python-test: build
 coverage: build ## runs the Python tests and reports which lines and branches of the package they reach
 	$(BIN)/pytest --cov --cov-report=term:skip-covered --cov-report=html
 
-check: lint types deny rustdoc test docs ## lint, types, licences, all tests, documentation: what CI runs
+check: lint types page-check deny rustdoc test docs ## lint, types, licences, all tests, documentation: what CI runs
 
 style: $(VENV)/.installed ## checks formatting and lints Python, without building
 	$(BIN)/ruff check $(PYTHON_FILES)
@@ -98,6 +116,9 @@ docs: build ## builds the documentation into site/
 images: build ## draws the documentation's pictures anew
 	$(BIN)/python docs/make_images.py
 
+page-images: build ## draws the pictures of the page anew, from the simulated farm; needs chromium
+	$(BIN)/python docs/make_page_images.py
+
 dist: build ## builds an sdist, a wheel from that sdist, and tries the wheel in a new environment
 	.ci/try_wheel
 
@@ -121,11 +142,11 @@ format: $(VENV)/.installed ## formats all code
 	cargo fmt --all
 
 clean: ## removes what was built, but not .venv
-	rm -rf target build dist site demo
+	rm -rf target build dist site demo $(PAGE) web/node_modules
 
 .PHONY: results peers services monitor-proof
 
-SERVICES := postgresql-15 mosquitto mbpoll prometheus nginx-light
+SERVICES := postgresql-15 mosquitto mbpoll prometheus nginx-light chromium
 
 services: ## installs the servers and clients that the service is tested with (Debian, as root); without them those tests are skipped
 	apt-get install -y --no-install-recommends $(SERVICES)
