@@ -1,0 +1,109 @@
+"""The first user, signing in and out, what each role sees, people and tokens."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+
+from page.conftest import Running, visiting
+
+PASSWORD = "correct horse battery"
+
+
+@pytest.fixture(scope="module")
+def admin(chromium: Any, company: Running) -> Any:
+    """The first user, made by the one-time link; the cookies of the session."""
+    with visiting(chromium, company.root) as visit:
+        visit.page.goto(company.link)
+        page = visit.page
+        page.get_by_label("Name").fill("Anna")
+        page.get_by_label("Password").fill(PASSWORD)
+        page.get_by_role("button", name="Set password").click()
+        page.wait_for_selector(".card")
+        assert visit.errors == []
+        yield visit.page.context.storage_state()
+
+
+def signed_in(chromium: Any, company: Running, state: Any) -> Any:
+    """A window of somebody who is signed in."""
+    return visiting(chromium, company.root, storage_state=state)
+
+
+def test_without_a_login_there_is_only_the_login(chromium: Any, company: Running, admin: Any) -> None:
+    with visiting(chromium, company.root) as visit:
+        page = visit.open()
+        page.get_by_role("heading", name="Sign in").wait_for()
+        assert page.locator(".card").count() == 0
+        page.get_by_label("Name").fill("Anna")
+        page.get_by_label("Password").fill("wrong password")
+        page.get_by_role("button", name="Sign in").click()
+        page.get_by_role("alert").wait_for()
+        assert page.get_by_role("alert").inner_text() == "Name or password is not right."
+        page.get_by_label("Password").fill(PASSWORD)
+        page.get_by_role("button", name="Sign in").click()
+        page.wait_for_selector(".card")
+        page.get_by_role("button", name="Sign out Anna").click()
+        page.get_by_role("heading", name="Sign in").wait_for()
+
+
+def invited(chromium: Any, company: Running, admin: Any, name: str, role: str) -> str:
+    """Invites somebody on the settings page; the link."""
+    with signed_in(chromium, company, admin) as visit:
+        page = visit.open("#/settings")
+        people = page.get_by_role("region", name="People")
+        people.get_by_label("Name").fill(name)
+        people.get_by_label("May").select_option(label=role)
+        people.get_by_role("button", name="Invite").click()
+        link = people.locator(".secret")
+        link.wait_for()
+        assert visit.errors == []
+        return str(link.inner_text())
+
+
+def test_the_lowest_role_sees_percent_and_nothing_else(chromium: Any, company: Running, admin: Any) -> None:
+    link = invited(chromium, company, admin, "Producer", "see percent only")
+    with visiting(chromium, company.root) as visit:
+        page = visit.page
+        page.goto(link)
+        page.get_by_label("Password").fill(PASSWORD)
+        page.get_by_role("button", name="Set password").click()
+        page.wait_for_selector(".card")
+        told = page.locator("main").inner_text()
+        assert re.search(r"\d+\s?%", told)
+        assert not re.search(r"\d (t|kg|m³)\b", told)
+        assert page.get_by_role("link", name="Settings").count() == 0
+        page.get_by_role("link", name="North 1", exact=True).click()
+        page.wait_for_selector(".trend canvas")
+        told = page.locator("main").inner_text()
+        assert not re.search(r"\d (t|kg|m³|m|mm)\b", told), told
+        assert page.get_by_role("tab").count() == 0
+        assert page.locator("canvas.solid").count() == 0
+        assert visit.errors == []
+
+
+def test_a_token_is_shown_once_and_works_until_revoked(chromium: Any, company: Running, admin: Any) -> None:
+    with signed_in(chromium, company, admin) as visit:
+        page = visit.open("#/settings")
+        tokens = page.get_by_role("region", name="Tokens")
+        tokens.get_by_label("For").select_option(label="reading")
+        tokens.get_by_label("Label").fill("report")
+        tokens.get_by_role("button", name="Make a token").click()
+        secret = tokens.locator(".secret")
+        secret.wait_for()
+        assert len(company.get("silos", secret.inner_text())["items"]) == 6
+        page.reload()
+        row = tokens.get_by_role("listitem").filter(has_text="report")
+        row.wait_for()
+        assert tokens.locator(".secret").count() == 0
+        row.get_by_role("button", name="Revoke").click()
+        row.wait_for(state="detached")
+
+
+def test_a_person_is_locked_out(chromium: Any, company: Running, admin: Any) -> None:
+    invited(chromium, company, admin, "Former", "see all")
+    with signed_in(chromium, company, admin) as visit:
+        page = visit.open("#/settings")
+        page.get_by_role("button", name="Lock out Former").click()
+        page.get_by_role("listitem").filter(has_text="Former").get_by_text("locked out").wait_for()
