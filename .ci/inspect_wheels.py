@@ -1,6 +1,6 @@
 """Checks wheels that can't be run here: machine type, newest glibc symbol, licence texts.
 
-    python .ci/inspect_wheels.py WHEEL...
+python .ci/inspect_wheels.py WHEEL...
 """
 
 import io
@@ -26,7 +26,9 @@ def faults(wheel: Path) -> list[str]:
         if len(core) != 1:
             return [f"{len(core)} compiled cores"]
         elf = ELFFile(io.BytesIO(archive.read(core[0])))
-    found = [f"no licence text {text}" for text in TEXTS if not any(name.endswith(f"licenses/{text}") for name in names)]
+    found = [
+        f"no licence text {text}" for text in TEXTS if not any(name.endswith(f"licenses/{text}") for name in names)
+    ]
     if elf.header["e_machine"] != expected:
         found.append(f"machine {elf.header['e_machine']}, not {expected}")
     if (newest := newest_glibc(elf)) > NEWEST_GLIBC:

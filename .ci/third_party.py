@@ -1,7 +1,7 @@
 """Collects the licence texts of every crate that is linked into the wheel.
 
-    python .ci/third_party.py            writes THIRD-PARTY-LICENSES.txt
-    python .ci/third_party.py --check    fails when the file is not what Cargo.lock makes of it
+python .ci/third_party.py            writes THIRD-PARTY-LICENSES.txt
+python .ci/third_party.py --check    fails when the file is not what Cargo.lock makes of it
 """
 
 import json

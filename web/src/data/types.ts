@@ -138,6 +138,93 @@ export interface Delivery {
   error: string | null;
 }
 
+/** That somebody at a box has seen an alert. */
+export interface EdgeAcknowledgement {
+  silo: string;
+  kind: string;
+  who: string;
+  note?: string | null;
+}
+
+/** A calibration that a box made. */
+export interface EdgeCalibration {
+  silo: string;
+  camera: string;
+  origin: string;
+  state: "confirmed" | "proposed" | "rejected";
+  frames: number;
+  valid_from: number;
+  valid_to: number | null;
+  confirmed_by: string | null;
+  document: string;
+}
+
+/** A reading with the frame it is of. */
+export interface EdgeReading {
+  camera: string;
+  sha256: string;
+  format: string;
+  bytes: number;
+  time: number;
+  clock: "good" | "corrected" | "suspect";
+  /** Whether its time is by the clock that `sent` is by. */
+  current: boolean;
+  run: number;
+  run_version: string;
+  run_config: string;
+  calibration: string | null;
+  values: EdgeValues;
+  /** Base64. */
+  surface: string | null;
+}
+
+/** What a box has measured. */
+export interface EdgeReadings {
+  box: string;
+  sent: number;
+  readings: EdgeReading[];
+}
+
+/** What a box goes by, as rows of the store. */
+export interface EdgeSettings {
+  /** Number of the last change that is in it. */
+  cursor: number;
+  settings: Record<string, (Record<string, unknown>)[]>;
+}
+
+/** All of it is safe; how much was new. */
+export interface EdgeTaken {
+  new: number;
+}
+
+/** A reading's columns. */
+export interface EdgeValues {
+  status: string;
+  reason: string | null;
+  message: string | null;
+  volume: number | null;
+  volume_std: number | null;
+  own_std: number | null;
+  ullage: number | null;
+  ullage_std: number | null;
+  fill: number | null;
+  capacity: number | null;
+  mass: number | null;
+  mass_std: number | null;
+  density: number | null;
+  level: number | null;
+  level_min: number | null;
+  level_max: number | null;
+  level_axis: number | null;
+  level_std: number | null;
+  datum: string | null;
+  distance: number | null;
+  distance_min: number | null;
+  distance_max: number | null;
+  coverage: number | null;
+  quality: (Record<string, unknown>)[];
+}
+
 /** A refill or a withdrawal. */
 export interface Event {
   id: string;
@@ -239,7 +326,7 @@ export interface NewTicket {
 
 /** A token to be made. */
 export interface NewToken {
-  role: "camera" | "read" | "metrics" | "admin";
+  role: "camera" | "read" | "metrics" | "edge" | "admin";
   camera?: string | null;
   name?: string | null;
 }
@@ -637,7 +724,7 @@ export interface Ticket {
 /** A token without its secret. */
 export interface Token {
   id: string;
-  role: "camera" | "read" | "metrics" | "admin";
+  role: "camera" | "read" | "metrics" | "edge" | "admin";
   camera: string | null;
   name: string | null;
   created: string;
