@@ -174,7 +174,6 @@ export interface EdgeReading {
   run_config: string;
   calibration: string | null;
   values: EdgeValues;
-  /** Base64. */
   surface: string | null;
 }
 
@@ -199,7 +198,7 @@ export interface EdgeTaken {
 
 /** A reading's columns. */
 export interface EdgeValues {
-  status: string;
+  status: "ok" | "refused";
   reason: string | null;
   message: string | null;
   volume: number | null;
@@ -222,7 +221,7 @@ export interface EdgeValues {
   distance_min: number | null;
   distance_max: number | null;
   coverage: number | null;
-  quality: (Record<string, unknown>)[];
+  quality: Remark[];
 }
 
 /** A refill or a withdrawal. */
@@ -588,6 +587,12 @@ export interface Remark {
   advice: string | null;
 }
 
+/** A role on a place; null is everywhere. */
+export interface RoleAt {
+  place: string | null;
+  role: "percent" | "viewer" | "operator" | "admin";
+}
+
 /** When an alert fires, and for which silos: the one that names a silo wins over a place's, and that over all. */
 export interface Rule {
   id: string;
@@ -623,7 +628,7 @@ export interface Session {
   person: string;
   kind: "user" | "token" | "local";
   role: "percent" | "viewer" | "operator" | "admin" | null;
-  grants: unknown[][];
+  grants: RoleAt[];
 }
 
 /** A user's name and password. */
