@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 from typing import Any
@@ -13,8 +13,10 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse
 from sqlalchemy.exc import OperationalError
+from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.routing import Route
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from siloscope import _core
 from siloscope.monitor.api import (
@@ -89,7 +91,7 @@ def create_app(service: Service) -> FastAPI:
         app.include_router(router, prefix=PREFIX)
     app.include_router(health.outside)
     _refuse_plainly(app)
-    app.middleware("http")(_with_headers)
+    app.add_middleware(_WithHeaders)
     _serve_page(app)
     app.openapi = lambda: _described(app)  # type: ignore[method-assign]
     return app
@@ -147,13 +149,25 @@ def _methods(path: str) -> set[str]:
     return found or {"GET"}
 
 
-async def _with_headers(request: Request, call: Callable[[Request], Awaitable[Response]]) -> Response:
-    response = await call(request)
-    for name, value in HEADERS.items():
-        response.headers.setdefault(name, value)
-    if request.url.path.startswith(PREFIX):
-        response.headers.setdefault("Cache-Control", "no-store")
-    return response
+class _WithHeaders:
+    """Adds the headers that every answer has; bodies pass it untouched, so that a frame's bytes take no detour."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """One request."""
+
+        async def with_headers(message: Message) -> None:
+            if message["type"] == "http.response.start":
+                headers = MutableHeaders(scope=message)
+                for name, value in HEADERS.items():
+                    headers.setdefault(name, value)
+                if scope["path"].startswith(PREFIX):
+                    headers.setdefault("Cache-Control", "no-store")
+            await send(message)
+
+        await self._app(scope, receive, with_headers if scope["type"] == "http" else send)
 
 
 def _serve_page(app: FastAPI) -> None:
