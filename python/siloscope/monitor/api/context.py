@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ipaddress
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import datetime
@@ -11,7 +10,6 @@ from typing import Annotated, Any
 from urllib.parse import urlsplit
 
 from fastapi import Depends, Query, Request
-from pydantic import BeforeValidator
 from sqlalchemy import Connection
 
 from siloscope.monitor import access
@@ -143,16 +141,6 @@ def micros_of(time: datetime | None, name: str) -> int | None:
     except (OverflowError, ValueError):
         raise Problem("invalid", f"'{name}' is no time that can be") from None
 
-
-def _written(value: object) -> object:
-    """Times are written out: a bare number could be seconds, milliseconds, or a year."""
-    if isinstance(value, str) and not re.match(r"\d{4}-\d\d-\d\d", value):
-        raise ValueError("must be a time such as 2026-03-01T06:00:00Z")
-    return value
-
-
-Time = Annotated[datetime, BeforeValidator(_written)]
-"""A time of a query."""
 
 After = Annotated[str | None, Query(description="Cursor: `next` of the page before.", max_length=80)]
 Count = Annotated[int, Query(ge=1, le=1000, description="Items of a page.")]

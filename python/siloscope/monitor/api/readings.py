@@ -12,7 +12,8 @@ from fastapi import APIRouter, Query
 from fastapi.responses import Response, StreamingResponse
 
 from siloscope.monitor.api import models, views
-from siloscope.monitor.api.context import After, Count, Reading, ServiceOf, SiloOf, Time, micros_of, refusals
+from siloscope.monitor.api.context import After, Count, Reading, ServiceOf, SiloOf, micros_of, refusals
+from siloscope.monitor.api.models.base import Time
 from siloscope.monitor.clock import DAY, SECOND, iso
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.service import Service

@@ -8,7 +8,8 @@ from fastapi import APIRouter, Query
 
 from siloscope.monitor import access, surfaces
 from siloscope.monitor.api import models, vessels, views
-from siloscope.monitor.api.context import After, Count, PersonOf, Reading, ServiceOf, SiloOf, Time, micros_of, refusals
+from siloscope.monitor.api.context import After, Count, PersonOf, Reading, ServiceOf, SiloOf, micros_of, refusals
+from siloscope.monitor.api.models.base import Time
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.store import places, readings
 

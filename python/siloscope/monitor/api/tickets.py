@@ -13,12 +13,12 @@ from siloscope.monitor.api.context import (
     Reading,
     ServiceOf,
     SiloOf,
-    Time,
     address_of,
     micros_of,
     need,
     refusals,
 )
+from siloscope.monitor.api.models.base import Time
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.store import people, tickets
 from siloscope.monitor.store.readings import Span

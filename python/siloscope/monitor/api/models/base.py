@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Generic, Literal, TypeVar
+import re
+from datetime import datetime
+from typing import Annotated, Generic, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
 
 Item = TypeVar("Item")
+
+
+def _written(value: object) -> object:
+    """Times are written out: a bare number could be seconds, milliseconds, or a year."""
+    if isinstance(value, int | float) or (isinstance(value, str) and not re.match(r"\d{4}-\d\d-\d\d", value)):
+        raise ValueError("must be a time such as 2026-03-01T06:00:00Z")
+    return value
+
+
+Time = Annotated[datetime, BeforeValidator(_written)]
+"""A time that is sent."""
 
 Clock = Literal["good", "corrected", "suspect"]
 

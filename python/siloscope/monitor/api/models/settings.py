@@ -7,7 +7,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from siloscope.monitor.api.models.base import Model
+from siloscope.monitor.api.models.base import Model, Time
 from siloscope.monitor.api.models.people import Given
 from siloscope.monitor.rules import KINDS
 
@@ -116,7 +116,7 @@ class Ticket(Model):
 class NewTicket(Given):
     """A ticket to be noted."""
 
-    time: datetime
+    time: Time
     mass_kg: float = Field(ge=-1e7, le=1e7)
     number: str | None = Field(default=None, max_length=80)
     note: str | None = Field(default=None, max_length=2000)
