@@ -189,7 +189,7 @@ def test_a_dropped_connection_resumes(
 def test_a_server_that_is_gone_is_told(sealed: str, server: str, monkeypatch: pytest.MonkeyPatch) -> None:
     from siloscope.fleet import object_store
 
-    monkeypatch.setattr(object_store, "_RETRY", {"max_retries": 0})
+    monkeypatch.setattr(object_store, "RETRY", {"max_retries": 0})
     monkeypatch.setattr(object_store, "PAUSE", 0.0)
     with socket.create_server(("127.0.0.1", 0)) as unused:
         port = unused.getsockname()[1]

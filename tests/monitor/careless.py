@@ -19,13 +19,13 @@ def acknowledge_first() -> None:
     record, promised = frames.record, threading.local()
     frames.__dict__["new_id"] = lambda: promised.id
 
-    def later(store: Any, arrival: Any, there: Callable[[], bool]) -> tuple[str, bool]:
+    def later(store: Any, arrival: Any, there: Callable[[], bool], *, archived: bool = False) -> tuple[str, bool]:
         key = new_id()
 
         def work() -> None:
             time.sleep(0.2)
             promised.id = key
-            record(store, arrival, there)
+            record(store, arrival, there, archived=archived)
 
         threading.Thread(target=work, daemon=True).start()
         return key, True

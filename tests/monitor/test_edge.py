@@ -60,7 +60,7 @@ def box(tmp_path: Path) -> Iterator[tuple[Farm, Machine]]:
 def linked(service: Farm, machine: Machine, address: str, token: str, frames: Any = "samples") -> Edge:
     entry = EdgeEntry(token_file="token", frames=frames, backlog_per_s=2000.0)
     edge = Edge(service, Client(address, token), entry, machine.told)
-    edge._epochs.look()
+    edge.epochs.look()
     return edge
 
 
@@ -92,7 +92,7 @@ def test_weeks_of_backlog_arrive_once_and_in_true_time(hub: Farm, box: tuple[Far
         if number == 80:
             machine.clock.time += lost
             lost = 0
-            edge._epochs.look()
+            edge.epochs.look()
         machine.wait(250 * MINUTE - SECOND)
         true += 250 * MINUTE
         farm.measured(service, machine.clock.time + SECOND, own_std=0.01 + number * 1e-6)
@@ -182,7 +182,7 @@ def test_settings_come_down_and_acknowledgements_go_up(hub: Farm, box: tuple[Far
             low = alerts.rule_get(connection, "low")
             values = {name: getattr(low, name) for name in ("place", "silo", "kind", "delay_s", "channels", "enabled")}
             alerts.put_rule(connection, "low", values | {"level": 0.4, "clear": 0.45}, hub.clock.now())
-        edge._asked = float("-inf")
+        edge.asked = float("-inf")
         edge.round()
         with service.store.read() as connection:
             assert places.get(connection, "silo", "silo7").name == "Renamed"

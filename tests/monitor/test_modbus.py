@@ -82,7 +82,7 @@ def test_both_word_orders_say_the_same(client: ModbusTcpClient, first: int, coun
 
 def test_an_old_answer_is_no_number(client: ModbusTcpClient, service: Farm) -> None:
     service.clock.time += farm.LATE
-    server(service)._made = -math.inf
+    server(service).made = -math.inf
     assert all(math.isnan(value) for value in read(client, "FLOAT32", 0, 22) + read(client, "FLOAT32", 100, 22))
     assert read(client, "UINT16", 128, 1) == 3
     assert read(client, "UINT32", 126) == farm.LATE // 1_000_000
@@ -90,7 +90,7 @@ def test_an_old_answer_is_no_number(client: ModbusTcpClient, service: Farm) -> N
 
 def test_remarks_are_bits(client: ModbusTcpClient, service: Farm) -> None:
     farm.reading(service, time=service.clock.now() + 1, quality=[{"code": "lens-film"}, {"code": "rathole"}])
-    server(service)._made = -math.inf
+    server(service).made = -math.inf
     assert read(client, "UINT16", 129, 1) == 1 << QUALITY.index("lens-film") | 1 << QUALITY.index("rathole")
 
 

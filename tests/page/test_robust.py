@@ -107,11 +107,11 @@ def test_all_is_reached_by_keyboard(visit: Visit) -> None:
     page.get_by_role("heading", name="North 3").wait_for()
     page.get_by_role("tab", name="Events").focus()
     page.keyboard.press("ArrowRight")
-    assert page.get_by_role("tab", name="Tickets").get_attribute("aria-selected") == "true"
+    page.get_by_role("tab", name="Tickets", selected=True).wait_for()
     assert page.evaluate("document.activeElement.textContent") == "Tickets"
     page.keyboard.press("ArrowLeft")
     page.keyboard.press("ArrowLeft")
-    assert page.get_by_role("tab", name="Rules").get_attribute("aria-selected") == "true"
+    page.get_by_role("tab", name="Rules", selected=True).wait_for()
 
 
 ENGLISH = re.compile(r"\b(Empty|Refill|Surface|Trend|Height|Acknowledge|since|ago)\b")

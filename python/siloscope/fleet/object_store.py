@@ -19,7 +19,7 @@ ATTEMPTS = 4
 PAUSE = 0.2
 """Seconds before the second attempt; doubled for each further one."""
 
-_RETRY = {"max_retries": 5, "retry_timeout": timedelta(seconds=60)}
+RETRY = {"max_retries": 5, "retry_timeout": timedelta(seconds=60)}
 
 
 class ObjectStore:
@@ -35,7 +35,7 @@ class ObjectStore:
         self._errors = self._obstore.exceptions
         plain = {"allow_http": "true"} if url.startswith("s3://") and _plain_endpoint() else {}
         try:
-            self._store = self._obstore.store.from_url(self.place, retry_config=_RETRY, client_options=plain or None)
+            self._store = self._obstore.store.from_url(self.place, retry_config=RETRY, client_options=plain or None)
         except (self._errors.BaseError, ValueError) as error:
             raise InputError(f"{self.place}: no object store can be opened ({_line(error)}); check the URL") from None
 

@@ -49,10 +49,10 @@ class Edge:
     def __init__(self, service: Service, client: Client, entry: EdgeEntry, told: Uptime | None = None) -> None:
         self._service, self._client, self._entry = service, client, entry
         self._store: Store = service.store
-        self._epochs = Epochs(service.store, service.clock, told or uptime())
+        self.epochs = Epochs(service.store, service.clock, told or uptime())
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name="edge", daemon=True)
-        self._asked = float("-inf")
+        self.asked = float("-inf")
         self._known: int | None = None
         """The hub's change up to which its settings are applied since the start."""
         self._allowed, self._last = 0.0, time.monotonic()
@@ -83,7 +83,7 @@ class Edge:
 
     def round(self) -> None:
         """One round of everything; raises `ServiceError` where the hub can't be reached or refuses."""
-        self._epochs.look()
+        self.epochs.look()
         self._settings()
         self._live()
         self._backlog()
@@ -92,9 +92,9 @@ class Edge:
 
     def _settings(self) -> None:
         now = time.monotonic()
-        if now - self._asked < SETTINGS_S:
+        if now - self.asked < SETTINGS_S:
             return
-        self._asked = now
+        self.asked = now
         if self._known is not None and not self._changed(self._known):
             return
         with self._store.read() as connection:
@@ -153,7 +153,7 @@ class Edge:
         if going:
             for key in {row.calibration for row in going if row.calibration is not None}:
                 self._calibration(key)
-            epochs = self._epochs.known()
+            epochs = self.epochs.known()
             told = [self._told(row, surfaces[row.id], epochs) for row in going]
             body = {"box": self._box, "sent": self._service.clock.now(), "readings": told}
             self._client.send_document("POST", "/api/v1/edge/readings", body)
@@ -165,7 +165,7 @@ class Edge:
         return max(1, len(rows))
 
     def _told(self, row: Any, surface: bytes | None, epochs: list[dict[str, Any]]) -> dict[str, Any]:
-        shift, current = self._epochs.of(epochs, row.id)
+        shift, current = self.epochs.of(epochs, row.id)
         names = ("camera", "sha256", "format", "bytes", "calibration", "run", "run_version", "run_config")
         return {name: getattr(row, name) for name in names} | {
             "time": max(0, row.time + shift),

@@ -20,7 +20,9 @@ export function Tabs({ silo, tab }: { silo: Silo; tab: Tab }) {
   };
   const step = (event: KeyboardEvent) => {
     const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
-    const next = way && TABS[(TABS.indexOf(tab) + way + TABS.length) % TABS.length];
+    // The focus moves at once, the address a moment later.
+    const at = TABS.findIndex((one) => `tab-${one}` === (event.target as HTMLElement).id);
+    const next = way && TABS[(at + way + TABS.length) % TABS.length];
     if (next) open(next);
   };
   return (

@@ -61,7 +61,7 @@ class Modbus(AsyncPart):
             ) from None
         self.port: int = self._socket.getsockname()[1]
         self._units: dict[int, Words] = {}
-        self._made = -math.inf
+        self.made = -math.inf
 
     async def main(self) -> None:
         """Serves until it is cancelled."""
@@ -104,7 +104,7 @@ class Modbus(AsyncPart):
         return struct.pack(f">BB{count}H", function, 2 * count, *found)
 
     def _registers(self) -> dict[int, Words]:
-        if time.monotonic() - self._made > KEPT_S:
+        if time.monotonic() - self.made > KEPT_S:
             with self._service.store.read() as connection:
                 found = images(connection, self._service.clock.now())
             self._units = {
@@ -112,7 +112,7 @@ class Modbus(AsyncPart):
                 for image in found
                 if image.silo.modbus_unit is not None
             }
-            self._made = time.monotonic()
+            self.made = time.monotonic()
         return self._units
 
 
