@@ -181,10 +181,11 @@ def test_a_calibration_says_what_its_frames_say_from_nothing(monkeypatch: pytest
     monkeypatch.setattr(
         sys.modules["siloscope.fusion.schedule"], "FULL_RES_FRAMES", len(sequence())
     )  # a quarter says less
-    each = [locate(frame, sensor=PROFILE) for frame in sequence()]
+    distinct = {frame.digest: frame for frame in sequence()}.values()  # a frame given twice counts once
+    each = [locate(frame, sensor=PROFILE) for frame in distinct]
     alone, found = calibrate(each), fused(sequence())
     assert [record.status for record in found.frames] == [record.status for record in alone.frames]
-    assert [move.index for move in found.moves] == [move.index for move in alone.moves] == [20]
+    assert [move.index for move in found.moves] == [move.index for move in alone.moves] == [19]
     assert found.parameters is not None
     assert found.parameter_covariance is not None
     assert alone.parameter_covariance is not None
