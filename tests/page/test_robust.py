@@ -150,7 +150,7 @@ def test_a_language_is_spoken_throughout(chromium: Any, farm: Running, language:
 
 @contextmanager
 def nginx(root: str, folder: Path) -> Iterator[str]:
-    """nginx in front of a service, below /farm/monitor/."""
+    """nginx in front of a service, below /barn/monitor/."""
     binary = shutil.which("nginx") or shutil.which("nginx", path="/usr/sbin")
     if binary is None:
         pytest.skip("nginx is missing: make services")
@@ -167,7 +167,7 @@ def nginx(root: str, folder: Path) -> Iterator[str]:
             access_log off; {temporary}
             server {{
                 listen 127.0.0.1:{port};
-                location /farm/monitor/ {{
+                location /barn/monitor/ {{
                     proxy_pass {root}/;
                     proxy_set_header Host $http_host;
                     proxy_set_header X-Forwarded-Host $http_host;
@@ -178,7 +178,7 @@ def nginx(root: str, folder: Path) -> Iterator[str]:
         }}""")
     process = subprocess.Popen([binary, "-c", f"{folder}/nginx.conf", "-e", f"{folder}/error.log"])
     try:
-        address = f"http://127.0.0.1:{port}/farm/monitor"
+        address = f"http://127.0.0.1:{port}/barn/monitor"
         for _ in range(100):
             with socket.socket() as probe:
                 if probe.connect_ex(("127.0.0.1", port)) == 0:
