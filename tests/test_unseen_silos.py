@@ -197,7 +197,7 @@ KINDS = {
     "worn funnels": Kind(worn_funnels, 0.7, 1.0, gravity=True),
     "corrugated, nothing known": Kind(corrugated, 0.9, 20.0, None, gravity=True),
     "feed stuck above the cone": Kind(stuck_above_the_cone, 0.8, 1.0, gravity=True),
-    "feed stuck to much of the view": Kind(stuck_to_much_of_the_view, 0.6, 1.0, gravity=True),
+    "feed stuck to much of the view": Kind(stuck_to_much_of_the_view, 0.7, 1.0, gravity=True),
     "feed stuck in bands": Kind(stuck_in_bands, 0.8, 1.0),
     "feed stuck before a wide sensor": Kind(stuck_before_a_wide_sensor, 0.8, 2.0, "azure-kinect", diameter=True),
     "feed below a cone, diameter known": Kind(feed_below_a_cone, 0.6, 15.0, None, diameter=True),

@@ -141,8 +141,9 @@ pub const PSEUDO_COEFFICIENTS: f64 = 1.0;
 const IDEAL: f64 = 0.1;
 /// The same for the intrinsics' common factor.
 const CAMERA_PSEUDO: f64 = 4.0;
-/// Range of that factor: deviations that are stated are not made smaller.
-const CAMERA_FACTORS: [f64; 2] = [1.0, 30.0];
+/// Range of that factor: deviations that are stated are not made smaller, and beyond five of them a frame contradicts
+/// what is known of its camera; no vessel is likelier for it.
+const CAMERA_FACTORS: [f64; 2] = [1.0, 5.0];
 
 impl Amplitudes {
     /// Before anything is seen.
