@@ -72,8 +72,16 @@ def perform(place: str, run: str, task: Task) -> Outcome:
     start = time.process_time()
     stage = {"locate": _locate, "fold": _fold, "measure": _measure}[task.kind]
     outcome = stage(opened(place, run), task)
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
-    return replace(outcome, cpu_seconds=time.process_time() - start, peak_bytes=peak)
+    return replace(outcome, cpu_seconds=time.process_time() - start, peak_bytes=_peak_bytes())
+
+
+def _peak_bytes() -> int:
+    """Largest resident size of this process so far; Linux's `ru_maxrss` would include the process that started it."""
+    try:
+        status = Path("/proc/self/status").read_text(encoding="ascii")
+    except OSError:
+        return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    return next(int(line.split()[1]) * 1024 for line in status.splitlines() if line.startswith("VmHWM:"))
 
 
 def _locate(run: Run, task: Task) -> Outcome:
