@@ -111,7 +111,7 @@ bench: build ## times every step of locate, a PNG decode beside it
 	$(BIN)/python benchmarks/locate.py
 
 docs: build ## builds the documentation into site/
-	$(BIN)/mkdocs build -q --strict
+	$(BIN)/mkdocs build --strict
 
 images: build ## draws the documentation's pictures anew
 	$(BIN)/python docs/make_images.py

@@ -7,9 +7,12 @@ import io
 import os
 import re
 from collections.abc import Callable
+from functools import partial
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
+ROOT = Path(__file__).parents[2]
 _PLACE = re.compile(r"<!-- generated: (\w+) -->")
 _VALUE = re.compile(r"\{\{ ([\w.]+) \}\}")
 
@@ -23,11 +26,6 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     """Called by mkdocs with each page's source; fills ``<!-- generated: NAME -->`` and ``{{ module.CONSTANT }}``."""
     filled = _PLACE.sub(lambda found: _PARTS[found[1]](), markdown)
     return _VALUE.sub(lambda found: _constant(*found[1].rsplit(".", 1)), filled)
-
-
-def on_page_content(html: str, **_: Any) -> str:
-    """Called by mkdocs with each page's HTML: links that lead from the repository's root into docs/ stay in docs/."""
-    return re.sub(r'href="docs/([^"]+?)\.md"', r'href="\1.html"', html)
 
 
 def commands() -> str:
@@ -133,6 +131,11 @@ def products() -> str:
     return "\n".join(["| product | kg/m³ | where the figures come from |", "|---|--:|---|", *rows])
 
 
+def from_root(name: str) -> str:
+    """A text at the repository's root; its links into docs/ lead on from there."""
+    return (ROOT / name).read_text(encoding="utf-8").replace("](docs/", "](")
+
+
 _PARTS: dict[str, Callable[[], str]] = {"commands": commands, "reasons": reasons, "sensors": sensors}
 _PARTS |= {
     "bottom_evidence": bottom_evidence,
@@ -141,3 +144,4 @@ _PARTS |= {
     "frame_statuses": frame_statuses,
 }
 _PARTS |= {"content_quality": content_quality, "products": products}
+_PARTS |= {"changes": partial(from_root, "CHANGELOG.md"), "design": partial(from_root, "DESIGN.md")}
