@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -141,13 +141,12 @@ def with_content(view: View, seen: Expected, calibration: Calibration) -> Expect
         content = measure(
             seen.depth, calibration, view.camera, sensor=view.sensor, vessel=view.vessel, top=view.inside.top
         )
-    except SiloscopeError:
-        return seen
-    values = {**vars(seen)}
-    values |= {
-        "volume_std": content.volume_std,
-        "ullage_std": content.ullage_std,
-        "level_std": content.level.std if content.level is not None else None,
-        "coverage": content.coverage,
-    }
-    return Expected(**values)
+    except SiloscopeError as error:
+        return replace(seen, warnings=(*seen.warnings, f"no content: {error}"))
+    return replace(
+        seen,
+        volume_std=content.volume_std,
+        ullage_std=content.ullage_std,
+        level_std=content.level.std if content.level is not None else None,
+        coverage=content.coverage,
+    )

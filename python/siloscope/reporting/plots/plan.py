@@ -48,20 +48,13 @@ def _roof(axes: Axes, plan: Plan) -> None:
 def _levels(axes: Axes, place: Place) -> None:
     a = place.placement
     title = f"best: {math.hypot(a.x, a.y):.2f} m from the axis, {a.aim} ({math.degrees(a.tilt):.0f}°)"
-    tidy(axes, title, "standard deviation of the axis (mm), of the volume (‰ of the largest)", "level (%)")
+    tidy(axes, title, "standard deviation of the axis by one frame (mm)", "level (%)")
     rows = [one for one in place.levels if one.axis_std is not None]
-    axes.plot(
-        [1e3 * (one.axis_std or 0.0) for one in rows],
-        [100.0 * one.level for one in rows],
-        "o-",
-        color=BLUE,
-        label="axis, mm",
-    )
+    axes.plot([1e3 * (one.axis_std or 0.0) for one in rows], [100.0 * one.level for one in rows], "o-", color=BLUE)
     for one in place.levels:
         said = one.reason or (f"volume ± {one.volume_std:.3f} m³" if one.volume_std is not None else "no volume")
         axes.annotate(
             said, (0.98, 100.0 * one.level), xycoords=("axes fraction", "data"), ha="right", fontsize=9, color=INK
         )
-    axes.set_xlabel("standard deviation of the axis by one frame (mm)")
     axes.set_xlim(0.0, 1.45 * max((1e3 * (one.axis_std or 0.0) for one in rows), default=1.0))
     axes.set_ylim(0.0, 100.0)
