@@ -232,7 +232,7 @@ class Wire:
         self.whole = True
 
     def asked(self, text: bytes, page: Any) -> bytes:
-        """What was sent in lower case, once `text` is in it or after 10 s: a page tells that it sends before it does."""
+        """What was sent in lower case, once `text` is in it or after 10 s: a page says that it sends before it does."""
         for _ in range(100):
             if text in (sent := b"".join(self.sent).lower()):
                 break
