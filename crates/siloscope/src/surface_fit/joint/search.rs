@@ -89,6 +89,7 @@ pub fn search(
             return Search { fits, weighed };
         }
     }
+    fits.extend(near.and_then(|fit| beside(frame, fit, &other_part)));
     let starts = distinct(near, proposals);
     let mut both = Vec::new();
     let mut alone = Vec::new();
@@ -131,6 +132,14 @@ pub fn search(
         weighed = weigh(frame, &fits);
     }
     Search { weighed, fits }
+}
+
+/// A cylinder that is known to a millimetre with the conical surface beside it: annealed, it would be taken for what
+/// sticks to it.
+fn beside(frame: &Frame, near: &Fit, other_part: impl Fn(&SiloSurface) -> Option<SiloSurface>) -> Option<JointFit> {
+    let surface = Some(&near.surface).filter(|s| s.radius.is_some() && s.cone.is_none()).and_then(other_part)?;
+    let state = state_of(&Fit { surface, ..near.clone() });
+    JointFit::start(Model::FreeCone, state, near.misfit.max(2e-4)).run(frame, &NEAR)
 }
 
 /// Proposals that would lead to the same answer are run once.
