@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 
 from siloscope import Camera, InputError
 from siloscope.io import camera_files
+from siloscope.io.camera_sizes import scaled
+from siloscope.types.intrinsics import IntrinsicsStd
 
 CAMERA = Camera(640, 480, 390.25, 391.5, 321.75, 239.125)
 K = (0.1, -0.05, 1e-3, -2e-5, 0.01)
@@ -254,3 +256,29 @@ def test_a_camera_that_can_not_be_is_refused_by_field(changed: dict[str, object]
     plain: dict[str, object] = {"width": 640, "height": 480, "fx": 570.3, "fy": 570.3, "cx": 319.5, "cy": 239.5}
     with pytest.raises(InputError, match=cause):
         Camera(**{**plain, **changed})  # type: ignore[arg-type]
+
+
+STATED = IntrinsicsStd(0.001, 0.5, 0.002)
+
+
+@pytest.mark.parametrize("suffix", [".json", ".toml"])
+def test_a_camera_keeps_how_exactly_it_is_known(suffix: str, tmp_path: Path) -> None:
+    known = replace(DISTORTED, intrinsics_std=STATED)
+    camera_files.dump(known, path := tmp_path / f"camera{suffix}")
+    assert camera_files.load(path) == known
+    assert Camera(**known.to_dict()) == known
+    assert "intrinsics_std" not in DISTORTED.to_dict()
+
+
+def test_the_principal_points_deviation_goes_with_the_pixels() -> None:
+    half = scaled(replace(CAMERA, intrinsics_std=STATED), (320, 240))
+    assert half.intrinsics_std == IntrinsicsStd(0.001, 0.25, 0.002)
+    assert half.intrinsics_std.of_rays(half) == pytest.approx(STATED.of_rays(CAMERA))
+
+
+@pytest.mark.parametrize("wrong", ["exact", 0.5, {}, {"f": -0.1}, {"f": True}, {"fx": 0.1}, {"c": float("nan")}])
+def test_deviations_that_are_none_are_named(wrong: object, tmp_path: Path) -> None:
+    path = tmp_path / "camera.json"
+    path.write_text(json.dumps({**CAMERA.to_dict(), "intrinsics_std": wrong}))
+    with pytest.raises(InputError, match=r"camera.json: intrinsics_std"):
+        camera_files.load(path)

@@ -13,6 +13,7 @@ import siloscope
 from siloscope import Camera, InputError, UsageError, sensors
 from siloscope.simulation import SensorModel
 from siloscope.simulation.scenarios import random_scene
+from siloscope.types.intrinsics import IntrinsicsStd
 
 SMALL = Camera(width=96, height=72, fx=85.5, fy=85.5, cx=47.5, cy=35.5)
 
@@ -74,6 +75,9 @@ def test_nominal_cameras_are_as_uncertain_as_the_profile_says() -> None:
     own = sensors.load("realsense-d415").camera(640, 480)
     assert stated() == stated(camera=own, intrinsics="nominal") == {"f": 0.03, "c": 6.4, "k1": 0.03}
     assert stated(camera=own) == {"f": 0.002, "c": 1.0, "k1": 0.003}
+    told = replace(own, intrinsics_std=IntrinsicsStd(0.001, 0.5, 0.0))
+    assert stated(camera=told) == {"f": 0.001, "c": 0.5, "k1": 0.0}
+    assert stated(camera=told, intrinsics="exact") == {"f": 0.0, "c": 0.0, "k1": 0.0}
     assert sensors.UNKNOWN.nominal_std(own).f == 0.02
 
 

@@ -44,4 +44,5 @@ def decimated_camera(camera: Camera) -> Camera:
         fy=camera.fy / STEP,
         cx=camera.cx / STEP,
         cy=camera.cy / STEP,
+        intrinsics_std=camera.intrinsics_std and camera.intrinsics_std.scaled(1.0 / STEP),
     )

@@ -77,6 +77,8 @@ class Settings:
             return EXACT
         if isinstance(self.intrinsics, IntrinsicsStd):
             return self.intrinsics
+        if self.intrinsics is None and frame.camera.intrinsics_std is not None:
+            return frame.camera.intrinsics_std
         name = self.intrinsics or ("nominal" if "intrinsics" in frame.config else "calibrated")
         return self.profile.nominal_std(frame.camera) if name == "nominal" else named(name, frame.camera)
 

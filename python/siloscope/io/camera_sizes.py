@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from siloscope.errors import InputError
 from siloscope.types.camera import Camera
+from siloscope.types.intrinsics import IntrinsicsStd
 
 Size = tuple[int, int]
 """Width and height in pixels."""
@@ -40,10 +41,12 @@ class Intrinsics:
     distortion_model: str = "none"
     distortion: tuple[float, ...] = ()
     size: Size | None = None
+    intrinsics_std: IntrinsicsStd | None = None
 
     def of_size(self, size: Size) -> Camera:
         """The camera of an image of this size; raises `InputError` for intrinsics that can't be used."""
-        return Camera(*size, self.fx, self.fy, self.cx, self.cy, self.distortion_model, self.distortion)
+        pixels = (self.fx, self.fy, self.cx, self.cy)
+        return Camera(*size, *pixels, self.distortion_model, self.distortion, self.intrinsics_std)
 
     def is_centred(self, size: Size, most: float) -> bool:
         """Whether the principal point lies near the middle of an image of this size."""
@@ -63,7 +66,8 @@ def scaled(camera: Camera, size: Size) -> Camera:
     """The camera of the same image at another size; pixel centres are at integers, so edges scale, not centres."""
     by = size[0] / camera.width
     cx, cy = (camera.cx + 0.5) * by - 0.5, (camera.cy + 0.5) * by - 0.5
-    return replace(camera, width=size[0], height=size[1], fx=camera.fx * by, fy=camera.fy * by, cx=cx, cy=cy)
+    std = camera.intrinsics_std and camera.intrinsics_std.scaled(by)
+    return Camera(*size, camera.fx * by, camera.fy * by, cx, cy, camera.distortion_model, camera.distortion, std)
 
 
 def choose(name: str, cameras: Sequence[Known], size: Size) -> tuple[Camera, str | None]:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from siloscope import _core
 from siloscope.errors import InputError
+from siloscope.types.intrinsics import IntrinsicsStd
 
 DISTORTION_MODELS = ("none", "brown_conrady", "inverse_brown_conrady", "rational", "kannala_brandt")
 """Names of the distortion models; coefficients are in the order of OpenCV and ROS."""
@@ -32,6 +33,8 @@ class Camera:
     distortion : tuple of float
         Coefficients: ``k1 k2 p1 p2 k3`` (brown_conrady and its inverse), ``… k4 k5 k6`` after them (rational),
         ``k1 k2 k3 k4`` (kannala_brandt).
+    intrinsics_std : IntrinsicsStd or mapping, optional
+        How exactly they are known, where a calibration states it: ``f``, ``c``, ``k1``.
 
     Raises
     ------
@@ -47,6 +50,7 @@ class Camera:
     cy: float
     distortion_model: str = "none"
     distortion: tuple[float, ...] = ()
+    intrinsics_std: IntrinsicsStd | None = None
 
     def __post_init__(self) -> None:
         if not all(map(is_number, self.distortion)):
@@ -65,6 +69,8 @@ class Camera:
         if self.distortion_model not in DISTORTION_MODELS:
             known = ", ".join(DISTORTION_MODELS)
             raise InputError(f"unknown distortion model '{self.distortion_model}'; known are {known}")
+        if not isinstance(self.intrinsics_std, IntrinsicsStd | None):
+            object.__setattr__(self, "intrinsics_std", IntrinsicsStd.of_fields(self.intrinsics_std))
         try:
             _core.check_camera(self)
         except ValueError as error:
@@ -85,7 +91,9 @@ class Camera:
     def to_dict(self) -> dict[str, Any]:
         """Plain data with the fields' names, as in our TOML and JSON camera files."""
         plain = {field.name: getattr(self, field.name) for field in fields(self)}
-        return {**plain, "distortion": list(self.distortion)}
+        stated = plain.pop("intrinsics_std")
+        known = {} if stated is None else {"intrinsics_std": stated.to_dict()}
+        return {**plain, "distortion": list(self.distortion), **known}
 
 
 def is_number(value: Any) -> bool:

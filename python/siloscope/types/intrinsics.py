@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from numbers import Real
+from typing import TYPE_CHECKING, Any
 
-from siloscope.errors import UsageError
-from siloscope.types.camera import Camera
+from siloscope.errors import InputError, UsageError
+
+if TYPE_CHECKING:
+    from siloscope.types.camera import Camera
 
 
 @dataclass(frozen=True)
@@ -21,6 +27,27 @@ class IntrinsicsStd:
     """Of the principal point, pixels."""
     k1: float
     """Of the first radial distortion coefficient."""
+
+    @classmethod
+    def of_fields(cls, fields: Any) -> IntrinsicsStd:
+        """From a camera file's ``intrinsics_std``: ``f``, ``c`` and ``k1``; one that is missing is 0.
+
+        Raises
+        ------
+        InputError
+            If it is no table of such numbers.
+        """
+        known = ("f", "c", "k1")
+        if not isinstance(fields, Mapping) or not fields or not fields.keys() <= set(known):
+            raise InputError(f"intrinsics_std is {fields!r}; give numbers by the names f (a fraction), c (pixels), k1")
+        for name, value in fields.items():
+            if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 <= float(value) < math.inf:
+                raise InputError(f"intrinsics_std: {name} is {value!r}, no standard deviation; give 0 or more")
+        return cls(*(float(fields.get(name, 0.0)) for name in known))
+
+    def scaled(self, by: float) -> IntrinsicsStd:
+        """Of the same camera's image at another size: the principal point's goes with the pixels."""
+        return replace(self, c=self.c * by)
 
     def of_rays(self, camera: Camera) -> tuple[float, float, float, float, float]:
         """Of fx and fy (relative), of cx and cy in units of the rays, and of k1."""

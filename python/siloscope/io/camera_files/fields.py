@@ -14,6 +14,7 @@ from siloscope.io.camera_files.distortion import distortion_model, is_fisheye
 from siloscope.io.camera_files.tables import bop_unit
 from siloscope.io.camera_sizes import Intrinsics, Known
 from siloscope.types.camera import Camera
+from siloscope.types.intrinsics import IntrinsicsStd
 
 _FIELD_NAMES = {
     "width": ("width", "image_width", "w"),
@@ -64,7 +65,17 @@ def from_fields(name: str, fields: Any, *, calibration: bool = False) -> CameraF
     named, k = _lens(name, inner, named)
     model = distortion_model(name, named, k)
     unit = bop_unit(fields) or depth_unit_of(name, inner) or depth_unit_of(name, fields)
-    return CameraFile((_camera(name, values, model, k, calibration),), unit)
+    lens = {"distortion_model": model, "distortion": () if model == "none" else tuple(k)}
+    return CameraFile((_camera(name, values, lens | _stated(name, inner, fields), calibration),), unit)
+
+
+def _stated(name: str, *tables: Mapping[str, Any]) -> dict[str, IntrinsicsStd]:
+    """How exactly the intrinsics are known, where a file states it."""
+    told = next((table["intrinsics_std"] for table in tables if table.get("intrinsics_std") is not None), None)
+    try:
+        return {} if told is None else {"intrinsics_std": IntrinsicsStd.of_fields(told)}
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from None
 
 
 def _size(name: str, fields: Mapping[str, Any]) -> dict[str, float]:
@@ -75,11 +86,10 @@ def _size(name: str, fields: Mapping[str, Any]) -> dict[str, float]:
     return {key: _number(name, key, _field(name, fields, key)) for key in ("width", "height")}
 
 
-def _camera(name: str, values: dict[str, float], model: str, k: list[float], calibration: bool) -> Known:
-    distortion = () if model == "none" else tuple(k)
+def _camera(name: str, values: dict[str, float], lens: dict[str, Any], calibration: bool) -> Known:
     size = {"width": values.get("width", 1), "height": values.get("height", 1)}
     try:
-        camera = Camera(**{**values, **size}, distortion_model=model, distortion=distortion)  # type: ignore[arg-type]
+        camera = Camera(**{**values, **size}, **lens)  # type: ignore[arg-type]
     except (InputError, OverflowError, ValueError) as error:
         raise InputError(f"{name}: {error}") from None
     if camera.cx == 0 == camera.cy:
@@ -87,7 +97,8 @@ def _camera(name: str, values: dict[str, float], model: str, k: list[float], cal
     if "width" in values and not calibration:
         return camera
     known = (camera.width, camera.height) if "width" in values else None
-    return Intrinsics(camera.fx, camera.fy, camera.cx, camera.cy, model, camera.distortion, known)
+    pixels = (camera.fx, camera.fy, camera.cx, camera.cy)
+    return Intrinsics(*pixels, camera.distortion_model, camera.distortion, known, camera.intrinsics_std)
 
 
 def _has_focal_length(fields: Mapping[str, Any]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from siloscope.errors import InputError
 from siloscope.types.camera import Camera
@@ -25,12 +26,18 @@ def dump(camera: Camera, path: str | PathLike[str], depth_unit: float | None = N
     path = Path(path)
     fields = camera.to_dict() | ({} if depth_unit is None else {"depth_unit": depth_unit})
     if path.suffix == ".toml":
-        text = "".join(f"{key} = {json.dumps(value)}\n" for key, value in fields.items())
+        text = "".join(f"{key} = {_toml(value)}\n" for key, value in fields.items())
     elif path.suffix in (".yaml", ".yml"):
         text = _ros_yaml(camera)
     else:
         text = json.dumps(fields, indent=2) + "\n"
     path.write_text(text, encoding="utf-8")
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + "}"
+    return json.dumps(value)
 
 
 def _ros_yaml(camera: Camera) -> str:
