@@ -73,6 +73,7 @@ def test_nominal_cameras_are_as_uncertain_as_the_profile_says() -> None:
         return siloscope.locate(depth, sensor="realsense-d415", **known).config["intrinsics_std"]
 
     own = sensors.load("realsense-d415").camera(640, 480)
+    assert own is not None
     assert stated() == stated(camera=own, intrinsics="nominal") == {"f": 0.03, "c": 6.4, "k1": 0.03}
     assert stated(camera=own) == {"f": 0.002, "c": 1.0, "k1": 0.003}
     told = replace(own, intrinsics_std=IntrinsicsStd(0.001, 0.5, 0.0))
