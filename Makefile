@@ -119,8 +119,9 @@ images: build ## draws the documentation's pictures anew
 page-images: build ## draws the pictures of the page anew, from the simulated farm; needs chromium
 	$(BIN)/python docs/make_page_images.py
 
-dist: build ## builds an sdist, a wheel from that sdist, and tries the wheel in a new environment
+dist: build ## builds an sdist, a wheel from that sdist, and tries the wheel and each extra in new environments
 	.ci/try_wheel
+	.ci/try_extras "$$(ls -t dist/siloscope-*.whl | head -1)"
 
 wheels: $(VENV)/.installed ## builds wheels for Linux x86-64 and aarch64 into dist/ (needs rustup)
 	.ci/build_wheels
