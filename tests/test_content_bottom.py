@@ -51,6 +51,15 @@ class TestRule:
         assert content.volume is None
         assert "--bottom cone" in (content.message or "")
 
+    def test_an_earlier_calibration_says_what_it_lacks(self) -> None:
+        """It has not recorded how far its cone was seen bare."""
+        made = scene(None, silo=STEEP)
+        early = replace(untold(made, 1e-3), frames=(FrameRecord(0, "frame", "used", 1.0),))
+        content = siloscope.measure(made.render().frame(), early)
+        assert content.volume is None
+        assert "earlier version" in (content.message or "")
+        assert siloscope.measure(made.render().frame(), early, bottom="cone").volume is not None
+
     def test_a_vague_slope_is_no_proof(self) -> None:
         made = scene(None, silo=replace(STEEP, cone_height=1.25))
         assert floor_of(untold(made, 0.1), Datasheet())[0].kind == "unknown"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,8 @@ import pytest
 import siloscope
 import vessels
 from oracle import bottoms as true
+from oracle.feed import Feed
+from siloscope.content.over_floor import places
 from siloscope.errors import InputError, UsageError
 from siloscope.vessel import bottoms
 from siloscope.vessel.vessel import load
@@ -29,7 +32,7 @@ def vessel_file(seen: vessels.Seen, path: Path) -> Path:
             lines += ['kind = "two-stage"', f"height = {bottom.upper + bottom.lower}", f"upper = {bottom.upper}",
                       f"waist = {2 * bottom.waist}", f"outlet = {2 * bottom.outlet}"]  # fmt: skip
         case true.Pyramid():
-            lines += ['kind = "pyramid"', f"height = {bottom.height}", f"outlet = {2 * bottom.outlet}",
+            lines += [f'kind = "{bottom.kind}"', f"height = {bottom.height}", f"outlet = {2 * bottom.outlet}",
                       f"azimuth = {math.degrees(bottom.azimuth)}"]  # fmt: skip
         case true.Cone():
             lines += ['kind = "oblique"', f"height = {bottom.height}", f"outlet = {2 * bottom.outlet}",
@@ -62,12 +65,48 @@ def test_an_empty_vessel_reads_nothing(kind: str, tmp_path: Path) -> None:
     assert content.volume < min(3.0 * content.volume_std, 0.02 * seen.capacity)
 
 
+@pytest.mark.parametrize("outlet", [0.0, 0.3])
+@pytest.mark.parametrize("azimuth", [0.0, 0.3])
+def test_wedge_and_pyramid_hold_what_integration_says(outlet: float, azimuth: float) -> None:
+    """Under a circle of radius R: h R² (π - 4/3) in a wedge, h R² (π - 4 √2 / 3) in a pyramid, less the cut tip."""
+    radius, height = 1.3, 1.1
+    half = outlet / 2.0
+    strip = 2.0 * (half * math.sqrt(radius**2 - half**2) + radius**2 * math.asin(half / radius))
+    chords = 4.0 / 3.0 * (radius**3 - (radius**2 - half**2) ** 1.5)  # ∫ |x| dA over the strip |x| < half
+    tip = {
+        "wedge": height / radius * (half * strip - chords),
+        "pyramid": height / radius * 4.0 * half**3 / 3.0,
+    }
+    whole = {"wedge": math.pi - 4.0 / 3.0, "pyramid": math.pi - 4.0 * math.sqrt(2.0) / 3.0}
+    for bottom in (bottoms.Wedge(height, outlet, azimuth), bottoms.Pyramid(height, outlet, azimuth)):
+        floor = bottom.floor_map(radius, 0.0)
+        x, y, area = places(radius, (0.0, 0.0))
+        held = float(floor.at(floor.z, x, y).sum() * area)
+        assert held == pytest.approx(height * radius**2 * whole[bottom.kind] - tip[bottom.kind], rel=1e-3)
+
+
+@pytest.mark.parametrize("level", [0.2, 0.7])
+def test_a_told_wedge_gives_a_true_volume(level: float, tmp_path: Path) -> None:
+    """Its content by quadrature over the oracle's wedge."""
+    drawn = vessels.Seen.draw("pyramid", 1)
+    rim, radius = drawn.vessel.bottom.rim, drawn.vessel.wall.radius
+    wedge = true.Wedge(rim, radius, 1.2 * radius, 0.5, 0.1 * radius)
+    empty = vessels.Seen(replace(drawn.scene, vessel=replace(drawn.vessel, bottom=wedge)))
+    seen = empty.with_feed(Feed(wedge.lowest - level * (wedge.lowest - 0.6 * rim)))
+    content = siloscope.measure(seen.frame, seen.calibration(), vessel=vessel_file(seen, tmp_path / "vessel.toml"))
+    assert content.volume is not None
+    off = abs(content.volume - seen.content)
+    assert off < 0.02 * seen.capacity
+    assert off < 4.0 * (content.volume_std or 0.0)
+
+
 @pytest.mark.parametrize(
     ("made", "told"),
     [
         (true.Cone(0.0, 1.3, 1.5, 0.1, (0.4, -0.3)), bottoms.Oblique(1.5, 0.2, 0.4, -0.3)),
         (true.TwoStage(0.0, 1.3, 0.5, 0.6, 0.9, 0.08), bottoms.TwoStage(1.4, 0.16, 0.5, 1.2)),
         (true.Pyramid(0.0, 1.3, 1.1, 0.4, 0.1), bottoms.Pyramid(1.1, 0.2, 0.4)),
+        (true.Wedge(0.0, 1.3, 1.1, 0.4, 0.1), bottoms.Wedge(1.1, 0.2, 0.4)),
     ],
 )
 def test_a_kind_is_the_oracle_s_surface(made: true.Bottom, told: bottoms.Bottom) -> None:
@@ -124,6 +163,28 @@ def test_an_obstacle_is_cut_out(tmp_path: Path) -> None:
     assert siloscope.measure(barred.frame, seen.calibration(), vessel=file).has("obstruction")
     assert cut.has("obstruction") == clear.has("obstruction")
     assert cut.volume == pytest.approx(clear.volume or 0.0, abs=2e-3 * seen.capacity)
+
+
+def test_an_obstacle_takes_its_own_volume(tmp_path: Path) -> None:
+    """A thick upright pipe: what stands in the feed is no feed, what stands over it is no free space."""
+    seen = vessels.Seen.draw("crater", 0)
+    file = vessel_file(seen, tmp_path / "plain.toml")
+    rim = seen.vessel.bottom.rim
+    told = tmp_path / "pipe.toml"
+    told.write_text(
+        f"{file.read_text()}[[obstacle]]\nstart = [0.9, 0.9, 0.0]\nend = [0.9, 0.9, {rim - 0.4}]\ndiameter = 0.01\n"
+    )
+    thick = tmp_path / "thick.toml"
+    thick.write_text(told.read_text().replace("diameter = 0.01", "diameter = 0.011"))
+    plain, cut = (siloscope.measure(seen.frame, seen.calibration(), vessel=at) for at in (told, thick))
+    bar = math.pi / 4.0 * (0.011**2 - 0.01**2) * (rim - 0.4)
+    lost = {
+        name: (getattr(plain, name) or 0.0) - (getattr(cut, name) or 0.0) for name in ("volume", "ullage", "capacity")
+    }
+    assert lost["capacity"] == pytest.approx(bar, rel=0.01)
+    assert lost["volume"] + lost["ullage"] == pytest.approx(bar, abs=0.05 * seen.capacity * 1e-3)
+    assert lost["volume"] > 0.0
+    assert lost["ullage"] > 0.0
 
 
 @pytest.mark.parametrize(

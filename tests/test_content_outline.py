@@ -53,6 +53,30 @@ def test_a_square_bin_has_ullage_and_with_a_floor_a_volume(tmp_path: Path) -> No
     assert (full.volume or 0.0) + (full.ullage or 0.0) == pytest.approx(2.4)
 
 
+def test_the_pose_s_deviation_is_in_the_volume_s(tmp_path: Path) -> None:
+    """What a turned pose does to the ullage of a tilted surface, by measuring with it."""
+    points = heap()
+    points[:, 2] += 0.2 * points[:, 0]
+    frame, vessel = siloscope.Frame(points=points), _vessel(tmp_path, "top = 1.5\n")
+
+    def ullage(*pose: float, std: tuple[float, float] | None = None) -> Content:
+        return siloscope.measure(frame, vessel=vessel, pose=siloscope.SiloPose(*pose), pose_std=std)
+
+    sure, vague = ullage(0.0, 0.0, 0.0, 0.0, std=(0.0, 0.0)), ullage(0.0, 0.0, 0.0, 0.0)
+    assert sure.ullage_parts is not None
+    assert sure.ullage_parts.pose == 0.0
+    assert sure.assumed == ()
+    assert "mrad" in vague.assumed[0]
+    for std, moved in (
+        ((4e-3, 0.0), ((4e-3, 0, 0, 0), (0, 4e-3, 0, 0))),
+        ((0.0, 0.02), ((0, 0, 0.02, 0), (0, 0, 0, 0.02))),
+    ):
+        change = math.hypot(*((ullage(*pose).ullage or 0.0) - (sure.ullage or 0.0) for pose in moved))
+        parts = ullage(0.0, 0.0, 0.0, 0.0, std=std).ullage_parts
+        assert parts is not None
+        assert parts.pose == pytest.approx(change, rel=0.1, abs=3e-4)
+
+
 def test_without_a_pose_there_is_nothing_to_go_by(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match="--pose"):
         siloscope.measure(siloscope.Frame(points=heap()), vessel=_vessel(tmp_path))

@@ -148,6 +148,9 @@ def test_the_story_is_told_by_ullage_where_the_bottom_is_unknown() -> None:
     assert plain.use is not None
     assert free.use.daily == pytest.approx(plain.use.daily)
     assert free.use.empty_by is None, "only a known bottom tells when it is reached"
+    assert free.use.lowest_by is not None
+    until = free.use.lowest_by - (free.readings[-1].time or 0.0)
+    assert until == pytest.approx((11.0 - 6.0) / free.use.daily * DAY, rel=1e-3)
     assert free.readings[7].flow == pytest.approx(plain.readings[7].flow)
 
 

@@ -10,9 +10,12 @@ import numpy as np
 import siloscope
 from oracle import kinds, volumes
 from oracle.clutter import Bar
+from oracle.drawing import Draw
 from oracle.feed import Feed
 from oracle.scenes import Scene, Vessel
+from oracle.sensors import Sensor
 from oracle.solids import Solid
+from oracle.walls import Courses, Round, Wall
 from siloscope import sensors
 from siloscope.sensors import SensorProfile
 from siloscope.types.floor import Floor
@@ -34,6 +37,18 @@ class Seen:
         """A scene of a kind, told its camera exactly."""
         drawn = kinds.draw(kind, seed, width)
         return cls(replace(drawn, told=drawn.camera))
+
+    @classmethod
+    def draw_all(cls, kind: str, seed: int, width: int, sensor: Sensor) -> Seen:
+        """A scene of a kind with wall and camera drawn from their priors: out of round, in courses, intrinsics off."""
+        drawn = kinds.draw(kind, seed, width)
+        d, vessel = Draw((seed, 1818)), drawn.vessel
+        assert vessel is not None
+        radius, rim, top = vessel.wall.radius, vessel.bottom.rim, vessel.top
+        step = d.between(0.001, 0.004)
+        courses = Courses((top + 0.35 * (rim - top), top + 0.7 * (rim - top)), (0.0, step, -step))
+        wall = Wall(radius, (Round(2, radius * d.log(0.0005, 0.005), d.angle()), courses))
+        return cls(replace(drawn, vessel=replace(vessel, wall=wall), sensor=sensor))
 
     @property
     def vessel(self) -> Vessel:
@@ -60,7 +75,7 @@ class Seen:
     @cached_property
     def profile(self) -> SensorProfile:
         """The sensor's own bias and noise."""
-        return sensors.load("orbbec-astra-s")
+        return sensors.load(self.scene.sensor.profile)
 
     def calibration(self, floor: Floor | None = None, std: float = 5e-4) -> siloscope.Calibration:
         """Pose and radius as they are, with a standard deviation; the bottom was never seen."""

@@ -14,7 +14,7 @@ from siloscope.calibrate import calibrate
 from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density, choose
 from siloscope.content.knowledge import know
-from siloscope.content.outlined import outlined, pose_of
+from siloscope.content.outlined import PlacedPose, outlined
 from siloscope.content.reading import source_of, unlocated
 from siloscope.content.silo_content import SiloContent
 from siloscope.content.units import at_moisture
@@ -56,6 +56,7 @@ def measure(
     test_weight: str | None = None,
     moisture: float | None = None,
     pose: SiloPose | None = None,
+    pose_std: tuple[float, float] | None = None,
     mask: ArrayLike | None = None,
     previous: Content | None = None,
 ) -> Content:
@@ -103,6 +104,9 @@ def measure(
         Of the feed, as a fraction of its wet mass: the answer then has the dry matter too.
     pose : SiloPose, optional
         The camera's pose where no calibration tells it, for a bin that is not round: its outline is in the vessel file.
+    pose_std : (float, float), optional
+        Standard deviations of a given pose's angles, rad, and of its place, m; `siloscope.content.outlined.POSE_STD`
+        where not given.
     mask : array of bool, optional
         True where the silo is.
     previous : Content, optional
@@ -119,10 +123,8 @@ def measure(
     chosen = choose(density, density_std, product, test_weight)
     if moisture is not None:
         at_moisture(1.0, moisture, 0.0)
-    about = given(
-        vessel, top, diameter=diameter, cylinder=cylinder, cone=cone, bottom=bottom,
-        outlet_diameter=outlet_diameter, outlet_length=outlet_length,
-    )  # fmt: skip
+    about = given(vessel, top, diameter=diameter, cylinder=cylinder, cone=cone, bottom=bottom,
+                  outlet_diameter=outlet_diameter, outlet_length=outlet_length)  # fmt: skip
     sheet, top = about.sheet, about.top
     table = strapping if isinstance(strapping, Strapping | None) else Strapping.read(strapping)
     profile = None if sensor is None else sensors.load(sensor)
@@ -131,14 +133,15 @@ def measure(
         raise UsageError("a pose alone bounds no surface; give a vessel file with an outline, or a calibration")
     if about.outline is not None:
         prepared = prepare(data, camera, profile or sensors.UNKNOWN, depth_unit=depth_unit, mask=mask)
-        placed = pose or pose_of(calibration)
+        placed = PlacedPose.of(pose, pose_std, calibration)
         return replace(outlined(prepared, placed, about, profile, chosen, source_of(data)), moisture=moisture)
     if calibration is None:
+        vessels = "coaxial" if sheet.bottom == "cone" or sheet.cone else "any"  # a cone that is told is not asked for
         estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask,
-                          vessels="coaxial")  # fmt: skip
-        if not estimate.ok:
-            return unlocated(data, estimate)
-        silo = calibrate([estimate], sensor=profile, diameter=sheet.diameter)
+                          vessels=vessels)  # fmt: skip
+        silo = calibrate([estimate], sensor=profile, diameter=sheet.diameter) if estimate.ok else None
+        if silo is None or not silo.ok:
+            return unlocated(data, estimate if silo is None else silo)
         known = know(silo, profile, sheet, top, None, steepest).assuming(ALONE)
     else:
         silo = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)

@@ -124,6 +124,7 @@ class Pyramid:
     """Direction in which one side falls."""
     outlet: float = 0.0
     """Half the side of the square outlet."""
+    kind = "pyramid"
 
     @property
     def apex(self) -> float:
@@ -136,13 +137,29 @@ class Pyramid:
         return self.apex - self.outlet * self.height / self.radius
 
     def air(self, x: Array, y: Array, z: Array) -> Array:
-        c, s = math.cos(self.azimuth), math.sin(self.azimuth)
-        reach = np.maximum(np.abs(c * x + s * y), np.abs(c * y - s * x))
-        space = self.radius * (1.0 - (z - self.rim) / self.height) - reach
+        space = self.radius * (1.0 - (z - self.rim) / self.height) - self.reach(x, y)
         return np.minimum(space / math.hypot(1.0, self.radius / self.height), self.lowest - z)
+
+    def reach(self, x: Array, y: Array) -> Array:
+        """Distance from the axis at which the sides are as deep, along the one that is nearest."""
+        c, s = math.cos(self.azimuth), math.sin(self.azimuth)
+        reach: Array = np.maximum(np.abs(c * x + s * y), np.abs(c * y - s * x))
+        return reach
 
     def label(self, x: Array, y: Array, z: Array) -> Labels:
         return everywhere(BOTTOM, z)
+
+
+@dataclass(frozen=True)
+class Wedge(Pyramid):
+    """Two sides that meet in a trough; `outlet` is half the trough's width."""
+
+    kind = "wedge"
+
+    def reach(self, x: Array, y: Array) -> Array:
+        """Distance from the trough."""
+        reach: Array = np.abs(math.cos(self.azimuth) * x + math.sin(self.azimuth) * y)
+        return reach
 
 
 Bottom = Flat | Cone | TwoStage | Pyramid

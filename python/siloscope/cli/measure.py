@@ -92,6 +92,9 @@ def measure(
     pose: Annotated[
         str | None, typer.Option(metavar="R_X,R_Y,T_X,T_Y", help="Pose (rad, m) in a bin whose outline --vessel has.")
     ] = None,
+    pose_std: Annotated[
+        str | None, typer.Option(metavar="RAD,M", help="Standard deviations of the pose's angles and place.")
+    ] = None,
     previous: Annotated[
         Path | None, typer.Option(metavar="FRAME", help="The frame before, to see whether the content moves.")
     ] = None,
@@ -115,6 +118,8 @@ def measure(
     before = None if previous is None else siloscope.measure(_frame(previous, 0, place), silo, **settings)
     if pose is not None:
         settings["pose"] = siloscope.SiloPose(*options.numbers(pose, 4, "--pose"))
+    if pose_std is not None:
+        settings["pose_std"] = tuple(options.numbers(pose_std, 2, "--pose-std"))
     inside = None if mask is None else _mask(mask, frame)
     content = siloscope.measure(frame, silo, mask=inside, previous=before, **settings)
     return _answer(content, out, as_json, units)

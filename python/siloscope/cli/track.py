@@ -160,8 +160,10 @@ def _print(found: Track) -> None:
     if found.use is not None:
         use = found.use
         daily = with_std(use.daily, use.daily_std, 1.0, " m³")
-        band = f"between {when(use.earliest)} and {when(use.latest)}"
-        console.print(f"use {daily} a day; empty by {when(use.empty_by)}, {band}", markup=False)
+        until = f"empty by {when(use.empty_by)}, between {when(use.earliest)} and {when(use.latest)}"
+        if found.basis == "ullage":
+            until = f"as low as ever seen by {when(use.lowest_by)}; the bottom is not known"
+        console.print(f"use {daily} a day; {until}", markup=False)
 
 
 def _row(reading: Reading, weighed: bool) -> tuple[str, ...]:

@@ -17,13 +17,15 @@ MARGIN = 0.02
 
 
 def with_vessel(content: Content, vessel: Vessel) -> Content:
-    """The reading with the volume of courses and roof; both keep the deviations."""
+    """The reading with the volume of courses and roof, without that of obstacles; all keep the deviations."""
     lengths = content.lengths
     if not content.ok or lengths is None or lengths.geometry.radius is None:
         return content
     radius, bottom = lengths.geometry.radius, lengths.geometry.cylinder_bottom
     roof = vessel.roof_volume(radius)
     under, over = (0.0, 0.0) if bottom is None else _courses(content, vessel, radius, bottom, bottom - lengths.top)
+    sunk, free = (0.0, 0.0) if bottom is None else _obstacles(content, vessel, radius, bottom, lengths.top)
+    under, over = under - sunk, over - free
     volume = None if content.volume is None else content.volume + under
     mass = content.mass
     if mass is not None and content.volume and volume is not None:
@@ -43,6 +45,22 @@ def _courses(content: Content, vessel: Vessel, radius: float, bottom: float, edg
     surface = content.surface
     height = 0.0 if wall is None or surface is None else min(max(bottom - (surface.datum - wall), 0.0), edge)
     return vessel.radius_change(0.0, height, radius), vessel.radius_change(height, edge, radius)
+
+
+def _obstacles(content: Content, vessel: Vessel, radius: float, edge: float, top: float) -> tuple[float, float]:
+    """Volume of the obstacles under the surface and over it, m³, as far as they are inside the vessel."""
+    surface, floor = content.surface, content.floor.map
+    sunk = free = 0.0
+    for bar in vessel.obstacles:
+        places, each = bar.pieces(edge)
+        x, y, z = places.T
+        inside = (np.hypot(x, y) < radius) & (z > top)
+        if floor is not None:
+            inside &= z < floor.at(floor.z, x, y)
+        under = np.zeros(len(z), np.bool_) if surface is None else z > surface.datum - surface.height(places[:, :2])
+        sunk += each * float((inside & under).sum())
+        free += each * float((inside & ~under).sum())
+    return sunk, free
 
 
 def without_obstacles(prepared: Prepared, known: Knowledge, vessel: Vessel) -> Prepared:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from siloscope import _core
 from siloscope.content.knowledge import Knowledge, narrowed
-from siloscope.content.setup import ContentSetup, CoreVessel
+from siloscope.content.setup import ContentSetup, CoreFloor, CoreVessel
 from siloscope.errors import InputError, UsageError
 from siloscope.estimation.decimation import STEP, decimated_camera
 from siloscope.estimation.inputs import Prepared, PreparedPoints
@@ -31,7 +31,8 @@ def _data(prepared: Prepared) -> DepthFrame | NDArray[np.float32]:
 def fitted(prepared: Prepared, known: Knowledge, sheet: Datasheet) -> _core.ContentMeasure:
     """The core's answer."""
     try:
-        return _core.content_measure(_data(prepared), ContentSetup(known, lengths_for_core(known, sheet)))
+        setup = ContentSetup(known, lengths_for_core(known, sheet), CoreFloor.of(known.floor.map))
+        return _core.content_measure(_data(prepared), setup)
     except ValueError as error:
         raise UsageError(str(error)) from None
 
@@ -61,7 +62,7 @@ BOTTOMLESS = 100.0
 
 
 def lengths_for_core(known: Knowledge, sheet: Datasheet) -> CoreVessel:
-    """Lengths as the core takes them; a floor that nobody knows is put out of sight."""
+    """Lengths as the core takes them; a floor that nobody knows, or that is a map, is put out of sight."""
     geometry = known.lengths.geometry
     if geometry.radius is None:
         raise InputError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from os import PathLike
 from typing import Any
 
@@ -35,23 +36,51 @@ UP = (0.0, 0.0, -1.0)
 """In the silo frame, whose z points down."""
 
 
-def pose_of(calibration: Calibration | str | PathLike[str] | None) -> SiloPose:
-    """The camera's pose by a calibration.
+POSE_STD = (5e-3, LENGTH_STD)
+"""Standard deviations of a given pose's angles, rad (a phone's level), and of its place, m."""
 
-    Raises
-    ------
-    UsageError
-        Where there is none: such a bin has no axis that a frame could show.
-    """
-    silo = Calibration.load(calibration) if isinstance(calibration, str | PathLike) else calibration
-    if silo is None or silo.pose is None:
-        raise UsageError("a bin with an outline has no axis to be found; give --pose r_x,r_y,t_x,t_y")
-    return silo.pose
+TURN, SHIFT = 1e-5, 1e-5
+"""Half the steps of the central differences by a pose's angles, rad, and place, m."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedPose:
+    """The camera's pose in a bin with an outline, and how well it is known."""
+
+    pose: SiloPose
+    covariance: NDArray[np.float64]
+    """(4, 4) of r_x, r_y, t_x, t_y."""
+    assumed: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls,
+        pose: SiloPose | None,
+        std: tuple[float, float] | None,
+        calibration: Calibration | str | PathLike[str] | None,
+    ) -> PlacedPose:
+        """A given pose, else a calibration's.
+
+        Raises
+        ------
+        UsageError
+            Where there is none: such a bin has no axis that a frame could show.
+        """
+        if pose is not None:
+            angle, place = std or POSE_STD
+            if not (angle >= 0.0 and place >= 0.0 and math.isfinite(angle + place)):
+                raise UsageError(f"the pose's deviations must be 0 or more, got {angle} rad and {place} m")
+            said = () if std else (f"the given pose to {1e3 * angle:g} mrad and {1e3 * place:g} mm",)
+            return cls(pose, np.diag([angle**2] * 2 + [place**2] * 2), said)
+        silo = Calibration.load(calibration) if isinstance(calibration, str | PathLike) else calibration
+        if silo is None or silo.pose is None:
+            raise UsageError("a bin with an outline has no axis to be found; give --pose r_x,r_y,t_x,t_y")
+        return cls(silo.pose, np.zeros((4, 4)) if silo.covariance is None else silo.covariance)
 
 
 def outlined(
     prepared: Prepared,
-    pose: SiloPose,
+    placed: PlacedPose,
     vessel: Vessel,
     profile: SensorProfile | None,
     density: Density | None,
@@ -63,7 +92,7 @@ def outlined(
     ----------
     prepared : PreparedDepth or PreparedPoints
         The frame.
-    pose : SiloPose
+    placed : PlacedPose
         The camera's.
     vessel : Vessel
         With an outline; its heights are those of the bin's upright walls.
@@ -77,7 +106,7 @@ def outlined(
     sensor = profile or UNKNOWN
     seen_by_camera = seen_points(prepared, sensor.bias)
     noise = _noise(sensor.noise or TYPICAL_NOISE, seen_by_camera)
-    points = pose.to_silo(seen_by_camera)
+    points = placed.pose.to_silo(seen_by_camera)
     corners = np.array(vessel.outline or ())
     inside = within(points[:, :2], corners)
     core = _core.content_relief(np.ascontiguousarray(points[inside]), UP, None, noise)
@@ -92,8 +121,10 @@ def outlined(
     top = 0.0 if vessel.top is None else vessel.fill_top or 0.0
     noise_std, unseen_std = _deviations(surface, x, y, area)
     edge = _length(corners) * WALL_STD * (float(np.mean(z)) - top)
-    placed = 0.0 if vessel.top is None else LENGTH_STD * area * len(x)
-    parts = Parts(0.0, math.hypot(edge, placed), 0.0, noise_std, unseen_std, 0.0)
+    top_std = 0.0 if vessel.top is None else LENGTH_STD * area * len(x)
+    by = area * len(x) * _by_pose(surface, placed.pose, x, y, z)
+    pose_std = math.sqrt(max(float(by @ placed.covariance @ by), 0.0))
+    parts = Parts(pose_std, math.hypot(edge, top_std), 0.0, noise_std, unseen_std, 0.0)
     std = math.hypot(*parts.to_dict().values())
     ullage = float((z - top).sum() * area)
     base: dict[str, Any] = {
@@ -104,6 +135,7 @@ def outlined(
         "surface": surface,
         "shape": surface.shape,
         "source": source,
+        "assumed": placed.assumed,
     }
     depth = vessel.sheet.cylinder
     told = vessel.sheet.bottom == "flat" or vessel.sheet.cone == 0.0
@@ -127,6 +159,26 @@ def outlined(
     return Content("ok", volume=volume, volume_std=std, parts=parts, capacity=capacity, capacity_from="datasheet",
                    level=level, height_datum="floor", floor=Floor("flat", "datasheet"), mass=mass, mass_std=mass_std,
                    density=None if density is None else density.to_dict(), **base)  # fmt: skip
+
+
+def _by_pose(
+    surface: SurfaceMap, pose: SiloPose, x: NDArray[np.float64], y: NDArray[np.float64], z: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Derivatives (4,) of the mean height z over places by the pose: the surface moves with its points."""
+    step = surface.cell
+    falls = [
+        (surface.height(_in_map(surface, x - a, y - b)) - surface.height(_in_map(surface, x + a, y + b))) / (2.0 * step)
+        for a, b in ((step, 0.0), (0.0, step))
+    ]
+    T = pose.T_silo_camera
+    seen = (np.column_stack([x, y, z]) - T[:3, 3]) @ T[:3, :3]
+    made = []
+    for k, half in enumerate((TURN, TURN, SHIFT, SHIFT)):
+        values = np.array([pose.r_x, pose.r_y, pose.t_x, pose.t_y])
+        ends = [SiloPose(*(values + sign * half * np.eye(4)[k])).to_silo(seen) for sign in (1.0, -1.0)]
+        dx, dy, dz = ((ends[0] - ends[1]) / (2.0 * half)).T
+        made.append(float((dz - falls[0] * dx - falls[1] * dy).mean()))
+    return np.array(made)
 
 
 def _noise(law: tuple[float, ...], points: NDArray[np.float64]) -> float:

@@ -1,8 +1,7 @@
-"""Volume between a surface and a floor that is known as a map.
+"""Content over a floor that is known as a map: what the floor adds to the core's numbers.
 
-The core has fitted the surface with the floor out of sight, so bare floor is part of the surface. Where it was seen,
-the thickness counts with its sign: noise on bare floor then adds up to nothing, and an empty vessel reads 0. Where it
-was not seen, the surface is continued, but not below the floor.
+The core fits the surface through the cells that lie over the floor, continues it where nothing is seen, and counts the
+cells that show the floor bare with their own thickness and its sign: noise on bare floor then adds up to nothing.
 """
 
 from __future__ import annotations
@@ -14,17 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
-from siloscope.content.setup import ContentSetup, CoreVessel
-from siloscope.content.ullage import GROUPS, capacity_derivatives, std_by
+from siloscope.content.knowledge import Knowledge
+from siloscope.content.setup import CoreVessel
+from siloscope.content.ullage import GROUPS, Ullage, std_by, top_std
 from siloscope.types.content import Parts
 from siloscope.types.floor import FloorMap
-from siloscope.types.surface_map import KINDS
 
 RINGS, SPOKES = 64, 90
 """Rings and spokes of the midpoint rule over the disc."""
-
-BELOW = 4.0
-"""Standard deviations below the floor at which a seen place is surely below it."""
 
 
 @dataclass(frozen=True)
@@ -35,63 +31,78 @@ class OverFloor:
     std: float
     parts: Parts
     capacity: float
-    sunken: float
-    """Fraction of the seen places that lie surely below the floor."""
+    free: Ullage
     columns: NDArray[np.float64]
     """Heights of the content over the floor at places of equal area, m."""
 
 
-def volume_over(
-    floor: FloorMap,
-    core: _core.ContentSurface,
-    found: _core.ContentMeasure,
-    setup: ContentSetup,
-) -> OverFloor:
-    """The content between a surface and a floor that is known as a map."""
-    silo, known = setup.silo, setup.known
-    x, y, area = _places(silo[0], silo[6:8])
-    bottom, surface = floor.at(floor.z, x, y), core.z_at(np.column_stack([x, y]))
-    thickness = bottom - surface
-    std = np.hypot(floor.at(floor.std, x, y), setup.wall_std)
-    seen = _seen(core, x, y)
-    counted = np.where(seen, thickness, np.maximum(thickness, 0.0))
-    covered = np.abs(thickness) > BELOW * std
-    floor_std = float((np.where(counted > 0.0, floor.at(floor.std, x, y), 0.0)).sum() * area)
-    by = _derivatives(floor, found, silo, float(counted.reshape(RINGS, SPOKES)[-1].mean()))
+def volume_over(floor: FloorMap, found: _core.ContentMeasure, known: Knowledge, silo: CoreVessel) -> OverFloor:
+    """The content between a surface, or none, and a floor that is known as a map.
+
+    Parameters
+    ----------
+    floor : FloorMap
+        The floor.
+    found : ContentMeasure
+        The core's answer.
+    known : Knowledge
+        Pose, lengths and their covariance.
+    silo : CoreVessel
+        The lengths that the core measured with.
+    """
+    x, y, area = places(silo[0], silo[6:8])
+    bottom, bottom_std = floor.at(floor.z, x, y), floor.at(floor.std, x, y)
+    under, whole = found.volume, area * len(x)
+    filled, counted, floor_std = (0.0, 0.0, 0.0) if under is None else (under.volume, under.counted, under.floor_std)
+    by = found.derivatives.copy()
+    if floor.derivatives is not None:
+        by += _of_floor(floor.derivatives) * (counted / whole)  # the floor's own move with camera and sensor
+    capacity_by = _capacity_derivatives(floor, silo, bottom, known.lengths.top_from)
+    rest_std = max(float(bottom_std.sum() * area) - floor_std, 0.0)
+    volume_parts, std = _deviations(by, found, known, floor_std)
+    rest_std = math.hypot(rest_std, top_std(known, silo))
+    ullage_parts, ullage_std = _deviations(capacity_by - by, found, known, rest_std)
+    capacity = float((bottom - silo[3]).sum() * area)
+    free = Ullage(capacity - max(filled, 0.0), ullage_std, ullage_parts, capacity_by - by)
+    columns = np.zeros(0) if found.surface is None else bottom - found.surface.z_at(np.column_stack([x, y]))
+    return OverFloor(max(filled, 0.0), std, volume_parts, capacity, free, columns[columns > 0.0])
+
+
+def _deviations(
+    by: NDArray[np.float64], found: _core.ContentMeasure, known: Knowledge, floor_std: float
+) -> tuple[Parts, float]:
+    """Standard deviations by cause and all together; `floor_std` is what the floor's own adds, m³."""
     parts = {name: std_by(by, known.covariance, group) for name, group in GROUPS.items()}
     parts["geometry"] = math.hypot(parts["geometry"], floor_std)
     own = {"noise": found.std.noise, "unseen": found.std.unseen, "grid": found.std.grid}
     total = math.hypot(std_by(by, known.covariance, slice(None)), floor_std, *own.values())
-    sunken = float((covered & (thickness < 0.0) & seen).sum() / max(seen.sum(), 1))
-    capacity = float((bottom - silo[3]).sum() * area)
-    return OverFloor(max(float(counted.sum() * area), 0.0), total, Parts(**parts, **own), capacity, sunken, counted)
+    return Parts(**parts, **own), total
 
 
-def _places(radius: float, ovality: tuple[float, ...]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+def _of_floor(derivatives: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Those of pose and depth: the radius is the core's."""
+    made = derivatives.copy()
+    made[4:7] = 0.0
+    return made
+
+
+def _capacity_derivatives(
+    floor: FloorMap, silo: CoreVessel, bottom: NDArray[np.float64], top_from: str
+) -> NDArray[np.float64]:
+    """Derivatives (10,) of the capacity by the parameters."""
+    if floor.derivatives is not None:
+        return floor.derivatives
+    made = np.zeros(10)
+    at_wall = float(bottom.reshape(RINGS, SPOKES)[-1].mean()) - silo[3]
+    made[4] = 2.0 * math.pi * silo[0] * at_wall
+    made[5] = 0.0 if top_from == "datasheet" else math.pi * silo[0] ** 2  # an edge placed from the joint moves with it
+    return made
+
+
+def places(radius: float, ovality: tuple[float, ...]) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
     """Places of equal area over the disc, and that area."""
     across = radius * np.sqrt((np.arange(RINGS) + 0.5) / RINGS)
     angle = 2.0 * math.pi * (np.arange(SPOKES) + 0.5) / SPOKES
     r, phi = (v.ravel() for v in np.meshgrid(across, angle, indexing="ij"))
     stretch = 1.0 + 0.5 * sum(o * o for o in ovality)
     return r * np.cos(phi), r * np.sin(phi), stretch * math.pi * radius**2 / (RINGS * SPOKES)
-
-
-def _seen(core: _core.ContentSurface, x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.bool_]:
-    kinds = core.kinds()
-    grid = core.grid
-    (cx, cy), reach, side = grid.centre, grid.reach, grid.side
-    column, row = (
-        np.clip(((v - c + reach) * side / (2.0 * reach)).astype(int), 0, side - 1) for v, c in ((x, cx), (y, cy))
-    )
-    return np.isin(kinds[row, column], (KINDS["content"], KINDS["rim"], KINDS["floor"]))
-
-
-def _derivatives(floor: FloorMap, found: _core.ContentMeasure, silo: CoreVessel, at_wall: float) -> NDArray[np.float64]:
-    """Derivatives (10,) of the volume: of the empty vessel's ullage less this frame's."""
-    by = found.derivatives - capacity_derivatives(silo)
-    by[4] = 2.0 * math.pi * silo[0] * at_wall  # a ring more of content at a wider wall
-    if floor.derivatives is None:
-        by[5] += math.pi * silo[0] ** 2  # the floor hangs at the cylinder's lower edge
-        return by
-    by[[0, 1, 2, 3, 7, 8, 9]] += floor.derivatives[[0, 1, 2, 3, 7, 8, 9]]
-    return by

@@ -17,9 +17,10 @@ from siloscope.content.fitting import lengths_for_core
 from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge
 from siloscope.content.measured import Measured
 from siloscope.content.over_floor import OverFloor, volume_over
-from siloscope.content.setup import ContentSetup, CoreVessel
+from siloscope.content.setup import CoreVessel
 from siloscope.content.ullage import Ullage, ullage_of
 from siloscope.reasons import CONTENT_REMARKS, sentence
+from siloscope.types.calibration import Calibration
 from siloscope.types.content import Content, Level, Remark, with_movement
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
@@ -61,9 +62,10 @@ def content_of(
     silo = lengths_for_core(known, request.sheet)
     lacking = _lacking(known, core)
     free = ullage_of(core, known, silo)
-    over = _over(core, ContentSetup(known, silo), free)
+    over = None if known.floor.map is None else volume_over(known.floor.map, core, known, silo)
     capacity, capacity_from = _capacity(request, silo, lacking, over)
     found = _with_hidden(_with_total(Measured.of(core), over, free if lacking else None), known)
+    free = free if over is None else over.free
     coverage = _coverage(core)
     said = (*known.remarks, *quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
     frame: dict[str, Any] = {
@@ -85,7 +87,9 @@ def content_of(
     if any(remark.code == "camera-moved" for remark in said):
         found = _with_move(found)
     volume = core.volume
-    answer = _empty(request, core, silo) if volume is None else _filled(request, found, volume, silo, lacking, over)
+    answer = (
+        _empty(request, core, silo, over) if volume is None else _filled(request, found, volume, silo, lacking, over)
+    )
     parts = None if lacking else found.parts
     if lacking:
         frame |= {"message": settles(known.floor, lacking), "quality": (*said, _unknown_bottom(known, lacking))}
@@ -96,18 +100,10 @@ def content_of(
     return with_movement(now, request.previous)
 
 
-def _over(core: _core.ContentMeasure, setup: ContentSetup, free: Ullage | None) -> OverFloor | None:
-    """The content over a floor that is known as a map; None where it is not, or no surface was found."""
-    floor, surface = setup.known.floor.map, core.surface
-    if floor is None or surface is None or free is None:
-        return None
-    return volume_over(floor, surface, core, setup)
-
-
 def _with_total(found: Measured, over: OverFloor | None, free: Ullage | None) -> Measured:
     """The core's answer with the deviations of what is stated: content over a map, or ullage alone."""
     if over is not None:
-        return replace(found, parts=over.parts, total=over.std, sunken=over.sunken)
+        return replace(found, parts=over.parts, total=over.std)
     return found if free is None else replace(found, total=free.std)
 
 
@@ -182,11 +178,13 @@ def _filled(
     }
 
 
-def _empty(request: Request, core: _core.ContentMeasure, silo: CoreVessel) -> dict[str, Any]:
-    """No content seen: none, up to the level that could hide on the vertex unseen."""
+def _empty(request: Request, core: _core.ContentMeasure, silo: CoreVessel, over: OverFloor | None) -> dict[str, Any]:
+    """No content seen: none, up to the level that could hide unseen on the vertex, or all over a mapped floor."""
     known = request.known
     volume, std = None, None
-    if not known.missing:
+    if over is not None and known.floor.map is not None:
+        volume, std = 0.0, DETECTABLE * math.hypot(WALL_STD, known.floor.map.mean_std) * math.pi * silo[0] ** 2
+    elif not known.missing:
         radius, bottom, apex, *_ = silo
         thin = DETECTABLE * math.hypot(WALL_STD, math.sqrt(max(float(known.covariance[6, 6]), 0.0)))
         nearest = 0.0 if core.bare is None else core.bare.nearest
@@ -316,7 +314,7 @@ def _config(request: Request) -> dict[str, Any]:
     }
 
 
-def unlocated(data: Frame | ArrayLike, estimate: Estimate) -> Content:
+def unlocated(data: Frame | ArrayLike, estimate: Estimate | Calibration) -> Content:
     """The answer where no calibration is given and the frame does not show the silo's axis."""
     message = f"{estimate.message} A calibration (--calibration) would do without."
     return Content("refused", estimate.reason, message, source=source_of(data), config=estimate.config)

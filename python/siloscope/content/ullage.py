@@ -53,14 +53,19 @@ def ullage_of(found: _core.ContentMeasure, known: Knowledge, silo: CoreVessel) -
     capacity = _capacity(silo)
     area = math.pi * silo[0] ** 2
     by = capacity_derivatives(silo) - found.derivatives
-    top_std = 0.0 if known.lengths.top_from == "camera" else area * LENGTH_STD
+    edge_std = top_std(known, silo)
     if known.lengths.top_from == "datasheet":
         by[5] -= area  # the edge is placed from the joint
     parts = {name: std_by(by, known.covariance, group) for name, group in GROUPS.items()}
-    parts["geometry"] = math.hypot(parts["geometry"], top_std)
+    parts["geometry"] = math.hypot(parts["geometry"], edge_std)
     own = {"noise": found.std.noise, "unseen": found.std.unseen, "grid": found.std.grid}
-    total = math.hypot(std_by(by, known.covariance, slice(None)), top_std, *own.values())
+    total = math.hypot(std_by(by, known.covariance, slice(None)), edge_std, *own.values())
     return Ullage(capacity - filled, total, Parts(**parts, **own), by)
+
+
+def top_std(known: Knowledge, silo: CoreVessel) -> float:
+    """What the upper edge, where it is given, adds to the ullage's deviation, m³."""
+    return 0.0 if known.lengths.top_from == "camera" else math.pi * silo[0] ** 2 * LENGTH_STD
 
 
 def _capacity(silo: CoreVessel) -> float:

@@ -12,7 +12,7 @@ from siloscope.tracking.events import events
 from siloscope.tracking.outliers import doubtful, gaps, outliers, without_steps
 from siloscope.tracking.use import use
 from siloscope.types.content import Content
-from siloscope.types.track import Reading, Track
+from siloscope.types.track import Reading, Track, Use
 
 MOVED = "camera-moved"
 """Remark on a reading whose errors are no longer those of its calibration."""
@@ -92,7 +92,7 @@ def track_of(
     return Track(
         tuple(told) + unread,
         tuple(replace(e, first=readings[kept[e.first]].index, last=readings[kept[e.last]].index) for e in found),
-        used if used is None or basis == "volume" else replace(used, empty_by=None, earliest=None, latest=None),
+        used if used is None or basis == "volume" else _without_bottom(used),
         capacity,
         None if last is None else last.height_datum,
         problems,
@@ -102,6 +102,11 @@ def track_of(
         gaps(time),
         name,
     )
+
+
+def _without_bottom(used: Use) -> Use:
+    """A forecast down to the lowest content seen, which is not the bottom."""
+    return replace(used, empty_by=None, earliest=None, latest=None, lowest_by=used.empty_by)
 
 
 def basis_of(readings: Sequence[Reading]) -> str:

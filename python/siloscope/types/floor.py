@@ -48,6 +48,12 @@ class FloorMap(ByValue):
         """z of the lowest place."""
         return float(self.z.max())
 
+    @property
+    def mean_std(self) -> float:
+        """Mean standard deviation of the places within the wall, m."""
+        x, y = self.middles(self.reach, len(self.std))
+        return float(self.std[np.hypot(x, y) <= self.reach].mean())
+
     def at(self, values: NDArray[np.float64], x: NDArray[np.float64], y: NDArray[np.float64]) -> NDArray[np.float64]:
         """A map's values between the cells' middles, bilinear, the nearest ones beyond the edge."""
         side = len(values)
@@ -92,6 +98,8 @@ class Floor(ByValue):
     """What the part of the bottom that was never seen adds to a volume's standard deviation, m³."""
     map: FloorMap | None = None
     """Its heights, where it is neither a coaxial cone nor flat."""
+    reach: tuple[float, float] | None = None
+    """Distances from the axis between which the conical surface was seen bare, m; None where that is not recorded."""
 
     @property
     def known(self) -> bool:

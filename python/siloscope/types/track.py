@@ -116,6 +116,10 @@ class Event:
         }
 
 
+FORECASTS = ("empty_by", "earliest", "latest", "lowest_by")
+"""Times of `Use`."""
+
+
 @dataclass(frozen=True)
 class Use:
     """How much is used a day, and until when it lasts."""
@@ -132,6 +136,8 @@ class Use:
     """Beginning of its 95 % band."""
     latest: float | None
     """End of its 95 % band."""
+    lowest_by: float | None = None
+    """Where the bottom is not known: when the content lies as low as it was ever seen, and not before it is empty."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -139,8 +145,8 @@ class Use:
             "daily_m3": self.daily,
             "daily_std_m3": self.daily_std,
             "day_to_day_std_m3": self.day_to_day,
-            **{key: getattr(self, key) for key in ("empty_by", "earliest", "latest")},
-            **{f"{key}_utc": utc(getattr(self, key)) for key in ("empty_by", "earliest", "latest")},
+            **{key: getattr(self, key) for key in FORECASTS},
+            **{f"{key}_utc": utc(getattr(self, key)) for key in FORECASTS},
         }
 
 

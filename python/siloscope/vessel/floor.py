@@ -57,8 +57,9 @@ def floor_of(
     if calibration.floor.known and calibration.floor.evidence != "steep":
         return replace(calibration.floor, seen=seen), ()
     if is_proof(seen, steepest):
-        hidden = _hidden(calibration, seen)
-        return (Floor(seen=seen) if hidden is None else Floor("cone", "steep", seen, hidden)), ()
+        hidden, reach = _hidden(calibration, seen), calibration.cone_reach
+        unproved = Floor(seen=seen, reach=reach)
+        return (unproved if hidden is None else Floor("cone", "steep", seen, hidden, reach=reach)), ()
     return Floor(seen=seen), ()
 
 
@@ -142,6 +143,11 @@ def settles(floor: Floor, missing: tuple[str, ...]) -> str:
         remedy = f"give {options}" if options else "calibrate with frames of a lower level"
         return f"Volume unavailable: of the {floor.kind} bottom the {lacking} is not known; {remedy}."
     if floor.seen is not None and floor.seen.angle > STEEPEST_REPOSE:
+        if floor.reach is None:
+            return (
+                f"Volume unavailable: how far the steep surface ({floor.seen}) was seen bare is not recorded in this "
+                "calibration, which an earlier version made; say --bottom cone if it is one cone, or calibrate again."
+            )
         return (
             f"Volume unavailable: only a part of the steep surface ({floor.seen}) was seen bare, another stage may "
             "follow; say --bottom cone if it is one cone, or calibrate with a frame of the empty vessel (--empty)."

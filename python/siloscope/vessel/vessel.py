@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from siloscope.schema import vessel as schema
 
 
+PIECES = 200
+"""Pieces of a bar when its volume under the surface is counted."""
+
+
 @dataclass(frozen=True)
 class Course:
     """A ring of the wall."""
@@ -45,6 +49,18 @@ class Obstacle:
     start: tuple[float, float, float]
     end: tuple[float, float, float]
     diameter: float
+
+    def ends(self, edge: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Both ends in the silo frame; `edge` is z of the cylinder's lower edge."""
+        start, end = (np.array([x, y, edge - height]) for x, y, height in (self.start, self.end))
+        return start, end
+
+    def pieces(self, edge: float) -> tuple[NDArray[np.float64], float]:
+        """Middles (`PIECES`, 3) of equal pieces of the bar, and the volume of each, m³."""
+        start, end = self.ends(edge)
+        along = (np.arange(PIECES) + 0.5) / PIECES
+        volume = math.pi * self.diameter**2 / 4.0 * float(np.linalg.norm(end - start))
+        return start + along[:, None] * (end - start), volume / PIECES
 
 
 @dataclass(frozen=True)
@@ -92,7 +108,7 @@ class Vessel:
         """Which points (N, 3) of the silo frame lie in an obstacle; `edge` is z of the cylinder's lower edge."""
         inside = np.zeros(len(points), np.bool_)
         for bar in self.obstacles:
-            start, end = (np.array([x, y, edge - height]) for x, y, height in (bar.start, bar.end))
+            start, end = bar.ends(edge)
             along = end - start
             place = np.clip((points - start) @ along / max(float(along @ along), 1e-12), 0.0, 1.0)
             apart = np.linalg.norm(points - start - place[:, None] * along, axis=1)

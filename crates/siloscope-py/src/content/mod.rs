@@ -15,6 +15,7 @@ use siloscope::content::cloud::Relief;
 use siloscope::content::jacobian::Covariance;
 use siloscope::content::silo_points::Source;
 use siloscope::content::{Setup, bare_reach, measure};
+use siloscope::geometry::floor_map::FloorMap;
 use siloscope::geometry::vessel::Vessel;
 use siloscope::{SiloPose, Vec3};
 use surface::{ContentSurface, MapGrid};
@@ -36,6 +37,23 @@ impl From<Silo> for Vessel {
     fn from(silo: Silo) -> Self {
         let Silo { radius, cylinder_bottom, apex, top, outlet_radius, outlet_length, oval_cos, oval_sin } = silo;
         Self { radius, cylinder_bottom, apex, top, outlet_radius, outlet_length, ovality: [oval_cos, oval_sin] }
+    }
+}
+
+/// `siloscope.content.setup.CoreFloor`.
+#[derive(FromPyObject)]
+struct Floor<'py> {
+    reach: f64,
+    z: PyReadonlyArray2<'py, f64>,
+    std: PyReadonlyArray2<'py, f64>,
+    of_camera: bool,
+}
+
+impl Floor<'_> {
+    fn of_core(&self) -> PyResult<FloorMap> {
+        let side = self.z.shape().first().copied().unwrap_or(0);
+        let flat = |values| arrays::in_c_order(values).map(|values| values.to_vec());
+        FloorMap::new(self.reach, side, flat(&self.z)?, flat(&self.std)?, self.of_camera).map_err(value_error)
     }
 }
 
@@ -72,6 +90,7 @@ struct Knowledge<'py> {
 struct ContentSetup<'py> {
     known: Knowledge<'py>,
     silo: Silo,
+    floor: Option<Floor<'py>>,
     wall_std: f64,
 }
 
@@ -81,6 +100,7 @@ impl ContentSetup<'_> {
         Ok(Setup {
             pose: SiloPose { r_x, r_y, t_x, t_y },
             vessel: self.silo.into(),
+            floor: self.floor.as_ref().map(Floor::of_core).transpose()?,
             covariance: matrix(&covariance)?,
             wall_std: self.wall_std,
             bias: depth_bias(bias),

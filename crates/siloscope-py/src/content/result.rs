@@ -88,12 +88,19 @@ pub struct SurfaceVolume {
     wall_fraction: f64,
     /// Greatest distance of the content's rim from the axis.
     reach: f64,
+    /// What a standard deviation of a mapped floor that is common to all of it does to the volume, m³.
+    floor_std: f64,
+    /// Area over which content or bare mapped floor counts, m².
+    counted: f64,
 }
 
 impl From<&Volume> for SurfaceVolume {
     fn from(v: &Volume) -> Self {
-        let Volume { volume, area, seen, moment, extremes: [highest, lowest], at_wall, wall_share, reach, .. } = *v;
-        Self { volume, area, seen, moment, highest, lowest, at_wall, wall_fraction: wall_share, reach }
+        let Volume {
+            volume, area, seen, moment, extremes: [highest, lowest], at_wall, reach, floor_std, counted, ..
+        } = *v;
+        let wall_fraction = v.wall_share;
+        Self { volume, area, seen, moment, highest, lowest, at_wall, wall_fraction, reach, floor_std, counted }
     }
 }
 

@@ -4,8 +4,8 @@ use super::cells::Cell;
 use super::fit::{Surface, fit, sketch};
 use super::grid::Grid;
 use super::jacobian::{CalibrationJacobian, Covariance, deviation};
+use super::under::Under;
 use super::volume::Kind;
-use crate::geometry::vessel::Vessel;
 
 /// A cell shows content where its mean lies so many standard deviations above the floor.
 const SIGMAS: f64 = 4.0;
@@ -45,8 +45,8 @@ pub struct Thing {
 /// What the cells are compared with.
 #[derive(Debug, Clone, Copy)]
 pub struct Floor<'a> {
-    /// The silo.
-    pub vessel: &'a Vessel,
+    /// The silo and its floor.
+    pub under: Under<'a>,
     /// The pose's derivatives.
     pub jacobian: &'a CalibrationJacobian,
     /// How well pose, geometry and depth are known.
@@ -58,9 +58,10 @@ pub struct Floor<'a> {
 impl Floor<'_> {
     /// How far a cell's mean lies above the floor, in standard deviations.
     fn sigmas_above(&self, cell: &Cell, grid: &Grid) -> f64 {
-        let thickness = self.vessel.floor(mean_radius(cell.mean, grid.cell())) - cell.mean[2];
-        let known = deviation(&self.jacobian.thickness(cell.mean, self.vessel), self.covariance);
-        let noise = cell.variance + self.wall_std * self.wall_std;
+        let [x, y, z] = cell.mean;
+        let thickness = self.under.over_cell(cell.mean, grid.cell()) - z;
+        let known = deviation(&self.under.thickness(cell.mean, self.jacobian), self.covariance);
+        let noise = cell.variance + self.wall_std * self.wall_std + self.under.std(x, y).powi(2);
         thickness / (known * known + noise).sqrt()
     }
 
@@ -85,14 +86,6 @@ pub fn extent(grid: &Grid, cells: impl Iterator<Item = usize>) -> Option<[f64; 2
     })
 }
 
-/// Mean distance from the axis over a square cell: `√(r² + c s²)` with the square's variance s².
-///
-/// c = 1/2 is right far from the axis, and 0.878 for a square about the axis.
-fn mean_radius([x, y, _]: [f64; 3], cell: f64) -> f64 {
-    let (square, spread) = (x * x + y * y, cell * cell / 6.0);
-    (square + (0.5 + 0.378 / (1.0 + square / spread)) * spread).sqrt()
-}
-
 /// Sorts the cells and fits the surface.
 pub fn classify(grid: &Grid, cells: &[Cell], floor: &Floor<'_>) -> Classified {
     let above = floor.all_above(cells, grid);
@@ -101,11 +94,11 @@ pub fn classify(grid: &Grid, cells: &[Cell], floor: &Floor<'_>) -> Classified {
     let (mut things, mut holes) = (Vec::new(), Vec::new());
     let mut surface = None;
     if let Some(sketch) = sketch(grid, cells, &main) {
-        (things, holes) = parted(grid, cells, &covered, &main, &sketch, floor.vessel);
+        (things, holes) = parted(grid, cells, &covered, &main, &sketch, floor.under.vessel.radius);
         let mut take = covered.clone();
         things.iter().flat_map(|t: &Thing| &t.cells).for_each(|&i| take[i] = false);
         for (take, cell) in take.iter_mut().zip(cells) {
-            *take = *take && clear_of_rim(&sketch, floor.vessel, cell);
+            *take = *take && clear_of_rim(&sketch, &floor.under, cell);
         }
         surface = fit(&sketch, cells, &take).or_else(|| fit(&sketch, cells, &main));
     }
@@ -116,16 +109,14 @@ pub fn classify(grid: &Grid, cells: &[Cell], floor: &Floor<'_>) -> Classified {
 }
 
 /// Whether the content's rim stays out of a cell.
-fn clear_of_rim(surface: &Surface, vessel: &Vessel, cell: &Cell) -> bool {
+fn clear_of_rim(surface: &Surface, under: &Under<'_>, cell: &Cell) -> bool {
     let [x, y, seen] = cell.mean;
-    let r = (x * x + y * y).sqrt().max(1e-9);
-    if vessel.floor(r) - seen > THICK * surface.grid.cell() {
+    let floor = under.z([x, y], x.hypot(y));
+    if floor - seen > THICK * surface.grid.cell() {
         return true;
     }
-    let [z, zx, zy] = surface.trend_at(x, y);
-    let fall = -vessel.cone_height() / vessel.radius / r;
-    let rise = (fall * x - zx).hypot(fall * y - zy);
-    vessel.floor(r) - z > CLEAR * surface.grid.cell() * rise
+    let ([z, zx, zy], [fx, fy]) = (surface.trend_at(x, y), under.slopes(x, y));
+    floor - z > CLEAR * surface.grid.cell() * (fx - zx).hypot(fy - zy)
 }
 
 fn kinds(grid: &Grid, cells: &[Cell], covered: &[bool], things: &[Thing]) -> Vec<Kind> {
@@ -190,7 +181,7 @@ fn parted(
     covered: &[bool],
     main: &[bool],
     surface: &Surface,
-    vessel: &Vessel,
+    radius: f64,
 ) -> (Vec<Thing>, Vec<Thing>) {
     let (labels, sizes) = parts(grid, cells, covered);
     let mut found: Vec<Thing> = vec![Thing { cells: Vec::new(), above: 0.0, at_wall: false }; sizes.len()];
@@ -199,7 +190,7 @@ fn parted(
         let thing = &mut found[labels[i]];
         thing.cells.push(i);
         thing.above += surface.trend_at(x, y)[0] - z;
-        thing.at_wall |= vessel.radius - x.hypot(y) < 2.0 * grid.cell();
+        thing.at_wall |= radius - x.hypot(y) < 2.0 * grid.cell();
     }
     found.iter_mut().for_each(|t| t.above /= t.cells.len().max(1) as f64);
     let least = (3.0 * surface.roughness).max(STEEPEST * grid.cell());

@@ -17,6 +17,7 @@ pub mod shape;
 pub mod silo_points;
 pub mod trend;
 pub mod uncertainty;
+pub mod under;
 pub mod visibility;
 pub mod volume;
 pub mod wall_shift;
@@ -79,7 +80,7 @@ pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
     let floor = seen.floor(setup);
     let Classified { kinds, surface, things, holes, sunken } = classify(&seen.grid, &seen.cells, &floor);
     let Seen { returns, grid, jacobian, cells, tally } = seen;
-    let volume = surface.as_ref().map(|s| integrate(s, &setup.vessel, &kinds));
+    let volume = surface.as_ref().map(|s| integrate(s, &setup.under(), &kinds, &cells));
     let (doubts, derivatives) = match (&surface, &volume) {
         (Some(surface), Some(volume)) => uncertainty_budget(surface, volume, &cells, &jacobian, setup),
         _ => (UncertaintyBudget::default(), Parameters::zeros()),
@@ -139,7 +140,7 @@ impl<'a> Seen<'a> {
 
     fn floor<'b>(&'b self, setup: &'b Setup) -> Floor<'b> {
         Floor {
-            vessel: &setup.vessel,
+            under: setup.under(),
             jacobian: &self.jacobian,
             covariance: &setup.covariance,
             wall_std: setup.wall_std,

@@ -2,7 +2,9 @@
 
 use super::bound::Bound;
 use super::jacobian::Covariance;
+use super::under::Under;
 use crate::SiloPose;
+use crate::geometry::floor_map::FloorMap;
 use crate::geometry::sensor::{DepthBias, NoiseLaw};
 use crate::geometry::vessel::Vessel;
 
@@ -13,6 +15,8 @@ pub struct Setup {
     pub pose: SiloPose,
     /// The silo.
     pub vessel: Vessel,
+    /// The floor, where it is not the vessel's cone; the vessel's own is then out of sight.
+    pub floor: Option<FloorMap>,
     /// How well pose, geometry and depth bias are known.
     pub covariance: Covariance,
     /// How uneven the wall is, metres (standard deviation).
@@ -28,6 +32,11 @@ pub struct Setup {
 }
 
 impl Setup {
+    /// What lies under the content.
+    pub fn under(&self) -> Under<'_> {
+        Under { vessel: &self.vessel, map: self.floor.as_ref() }
+    }
+
     /// The cylinder with the variance of a point's distance to it.
     pub fn bound(&self) -> Bound {
         let c = &self.covariance;

@@ -7,8 +7,8 @@ use super::grid::Grid;
 use super::jacobian::{CalibrationJacobian, DEPTH, GEOMETRY, POSE, Parameters, deviation, share};
 use super::setup::Setup;
 use super::trend::Observation;
+use super::under::Under;
 use super::volume::Volume;
-use crate::geometry::vessel::Vessel;
 use nalgebra::DVector;
 use std::f64::consts::TAU;
 
@@ -69,14 +69,21 @@ pub fn uncertainty_budget(
         derivatives -= influence * jacobian.heights(cell.mean, *slopes);
         noise += influence * influence * cell.variance;
     }
+    let of_surface = noise;
+    let under = setup.under();
+    for (cell, weight) in cells.iter().zip(&volume.bare).filter(|(_, weight)| **weight > 0.0) {
+        let [x, y, _] = cell.mean;
+        derivatives -= *weight * jacobian.heights(cell.mean, under.slopes(x, y));
+        noise += weight * weight * cell.variance;
+    }
     derivatives[4] += volume.geometry.radius;
     derivatives[5] += volume.geometry.cylinder_bottom;
     derivatives[6] += volume.geometry.apex;
     let patch = surface.patch * surface.grid.cell().powi(2);
     let hidden = (volume.area - volume.seen).max(0.0) * patch * surface.roughness.powi(2);
-    let continued = (left.dot(&surface.trend.spread(&left)) - noise).max(0.0);
+    let continued = (left.dot(&surface.trend.spread(&left)) - of_surface).max(0.0);
     let unseen = WIDER * WIDER * continued + hidden;
-    let grid = grid_error(&surface.grid, volume, &setup.vessel);
+    let grid = grid_error(&surface.grid, volume, &under);
     let known = deviation(&derivatives, covariance).powi(2);
     let out = UncertaintyBudget {
         pose: share(&derivatives, covariance, POSE),
@@ -96,8 +103,9 @@ const CELL_ERROR: f64 = 3e-5;
 const RIM_ERROR: f64 = 0.005;
 
 /// What the cells leave of the volume, as measured on exact frames.
-fn grid_error(grid: &Grid, volume: &Volume, vessel: &Vessel) -> f64 {
+fn grid_error(grid: &Grid, volume: &Volume, under: &Under<'_>) -> f64 {
     let rim = TAU * volume.reach * (1.0 - volume.wall_share);
-    let wedge = grid.cell().powi(2) * vessel.cone_height() / vessel.radius * rim;
+    let [height, run] = under.rise();
+    let wedge = grid.cell().powi(2) * height / run * rim;
     (CELL_ERROR * volume.area).hypot(RIM_ERROR * wedge)
 }

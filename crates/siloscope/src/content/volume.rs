@@ -1,12 +1,15 @@
 //! The volume between the silo's floor and the surface, with all it depends on.
 //!
-//! V = ∫∫ (floor(r) - z(x, y))₊ dA, in polar coordinates: the trapezoid rule over the angle, which is as good as exact for
+//! V = ∫∫ (floor(x, y) - z(x, y))₊ dA, in polar coordinates: the trapezoid rule over the angle, which is as good as exact for
 //! a smooth periodic function, and along each spoke Gauss's rule on pieces that begin and end where the surface meets the
-//! cone. The silo's round wall is the spokes' end, so no cell has to be cut.
+//! floor. The silo's round wall is the spokes' end, so no cell has to be cut. Over a floor that is known as a map, cells
+//! that show it bare count with their own thickness and its sign: thin feed that none of them proves adds up, noise does not.
 
+use super::cells::Cell;
 use super::detail;
 use super::fit::Surface;
-use crate::geometry::vessel::{Shells, Vessel};
+use super::under::Under;
+use crate::geometry::vessel::Shells;
 use nalgebra::DVector;
 use std::f64::consts::TAU;
 
@@ -56,10 +59,16 @@ pub struct Volume {
     pub cells: Vec<f64>,
     /// Derivatives by the geometry at a fixed surface.
     pub geometry: Shells,
+    /// Weights of the bare cells' own heights in ∫ z dA.
+    pub bare: Vec<f64>,
+    /// What a standard deviation of the floor that is common to all of it does to the volume.
+    pub floor_std: f64,
+    /// Area over which content or bare floor counts.
+    pub counted: f64,
 }
 
 /// Integrates the content.
-pub fn integrate(surface: &Surface, vessel: &Vessel, kinds: &[Kind]) -> Volume {
+pub fn integrate(surface: &Surface, under: &Under<'_>, kinds: &[Kind], cells: &[Cell]) -> Volume {
     let functions = surface.basis.functions();
     let mut sums = Volume {
         volume: 0.0,
@@ -73,11 +82,14 @@ pub fn integrate(surface: &Surface, vessel: &Vessel, kinds: &[Kind]) -> Volume {
         functions: DVector::zeros(functions),
         cells: vec![0.0; surface.grid.count()],
         geometry: Shells::default(),
+        bare: vec![0.0; surface.grid.count()],
+        floor_std: 0.0,
+        counted: 0.0,
     };
     let mut rims = (0.0, 0.0);
     for spoke in 0..SPOKES {
         let angle = TAU * (spoke as f64 + 0.5) / SPOKES as f64;
-        let spoke = Spoke { surface, vessel, kinds, direction: [angle.cos(), angle.sin()] };
+        let spoke = Spoke { surface, under, kinds, cells, direction: [angle.cos(), angle.sin()] };
         if let Some(rim) = spoke.add(&mut sums) {
             rims = (rims.0 + rim, rims.1 + 1.0);
         }
@@ -90,8 +102,9 @@ pub fn integrate(surface: &Surface, vessel: &Vessel, kinds: &[Kind]) -> Volume {
 /// One spoke from the axis to the wall.
 struct Spoke<'a> {
     surface: &'a Surface,
-    vessel: &'a Vessel,
+    under: &'a Under<'a>,
     kinds: &'a [Kind],
+    cells: &'a [Cell],
     direction: [f64; 2],
 }
 
@@ -109,7 +122,7 @@ impl Spoke<'_> {
     /// Thickness of the content; negative where the surface would lie below the floor.
     fn thickness(&self, r: f64) -> f64 {
         let [x, y] = self.place(r);
-        self.vessel.floor(r) - self.surface.height(x, y)
+        self.under.z([x, y], r) - self.surface.height(x, y)
     }
 
     /// Adds the spoke's pieces; gives z of the surface at its outer rim.
@@ -118,16 +131,16 @@ impl Spoke<'_> {
         let mut inner = (0.0, self.thickness(0.0));
         for piece in self.ends() {
             let outer = (piece, self.thickness(piece));
-            if self.kind(0.5 * (inner.0 + piece)) != Kind::Bare
-                && let Some((from, to)) = self.covered(inner, outer)
-            {
+            if self.kind(0.5 * (inner.0 + piece)) == Kind::Bare {
+                self.bare(inner.0, piece, sums);
+            } else if let Some((from, to)) = self.covered(inner, outer) {
                 self.piece(from, to, sums);
                 rim = Some(to);
             }
             inner = outer;
         }
         sums.reach = sums.reach.max(rim?);
-        let at_wall = rim? >= self.vessel.radius * (1.0 - 1e-9);
+        let at_wall = rim? >= self.under.vessel.radius * (1.0 - 1e-9);
         if at_wall {
             self.wall(sums);
         }
@@ -137,7 +150,7 @@ impl Spoke<'_> {
 
     /// Outer ends of the pieces: evenly spread, and the outlet's rim where there is one.
     fn ends(&self) -> impl Iterator<Item = f64> {
-        let (radius, outlet) = (self.vessel.radius, self.vessel.outlet_radius);
+        let (radius, outlet) = (self.under.vessel.radius, self.under.vessel.outlet_radius);
         (1..=PIECES).flat_map(move |i| {
             let end = radius * i as f64 / PIECES as f64;
             let begin = radius * (i - 1) as f64 / PIECES as f64;
@@ -183,36 +196,56 @@ impl Spoke<'_> {
         for node in GAUSS {
             let r = from + node * (to - from);
             let [x, y] = self.place(r);
-            let ring = 0.5 * (to - from) * r * TAU / SPOKES as f64 * self.vessel.stretch();
+            let ring = self.ring(from, to, r);
             let row = surface.row(x, y);
             let near = detail::weights(&surface.grid, x, y);
             let extra: f64 = near.iter().map(|&(i, w)| w * surface.detail[i]).sum();
             let z = surface.datum + surface.trend.height(&row) * surface.grid.reach + extra;
-            sums.volume += ring * (self.vessel.floor(r) - z);
+            sums.volume += ring * (self.under.z([x, y], r) - z);
             sums.area += ring;
             sums.moment += ring * z;
             sums.seen += if matches!(self.kind(r), Kind::Feed | Kind::Rim) { ring } else { 0.0 };
             sums.extremes = [sums.extremes[0].min(z), sums.extremes[1].max(z)];
             row.iter().for_each(|(i, value)| sums.functions[i] += ring * value * surface.grid.reach);
             near.iter().for_each(|&(i, w)| sums.cells[i] += ring * w);
-            self.floor_moves(r, ring, &mut sums.geometry);
+            self.floor_moves([x, y], r, ring, sums);
         }
     }
 
-    fn floor_moves(&self, r: f64, ring: f64, geometry: &mut Shells) {
-        if r < self.vessel.outlet_radius {
-            geometry.apex += ring;
-            return;
+    /// A Gauss node's area.
+    fn ring(&self, from: f64, to: f64, r: f64) -> f64 {
+        0.5 * (to - from) * r * TAU / SPOKES as f64 * self.under.vessel.stretch()
+    }
+
+    /// Adds the cells' own heights over a piece of mapped floor that is seen bare.
+    fn bare(&self, from: f64, to: f64, sums: &mut Volume) {
+        let Some(map) = self.under.map else { return };
+        for node in GAUSS {
+            let r = from + node * (to - from);
+            let [x, y] = self.place(r);
+            let Some(index) = self.surface.grid.index(x, y) else { continue };
+            let Some(cell) = self.cells.get(index).filter(|cell| cell.seen()) else { continue };
+            let ring = self.ring(from, to, r);
+            let [cx, cy, z] = cell.mean;
+            sums.volume += ring * (map.z(cx, cy) - z);
+            sums.bare[index] += ring;
+            self.floor_moves([x, y], r, ring, sums);
         }
-        let by = self.vessel.cone_derivatives(r);
-        geometry.radius += ring * by.radius;
-        geometry.cylinder_bottom += ring * by.cylinder_bottom;
-        geometry.apex += ring * by.apex;
+    }
+
+    fn floor_moves(&self, [x, y]: [f64; 2], r: f64, ring: f64, sums: &mut Volume) {
+        let by = self.under.derivatives(r);
+        sums.geometry.radius += ring * by.radius;
+        sums.geometry.cylinder_bottom += ring * by.cylinder_bottom;
+        sums.geometry.apex += ring * by.apex;
+        sums.floor_std += ring * self.under.std(x, y);
+        sums.counted += ring;
     }
 
     /// A wider silo has a ring more of content where the surface reaches its wall.
     fn wall(&self, sums: &mut Volume) {
         sums.wall_share += 1.0;
-        sums.geometry.radius += self.vessel.radius * TAU / SPOKES as f64 * self.thickness(self.vessel.radius);
+        let radius = self.under.vessel.radius;
+        sums.geometry.radius += radius * TAU / SPOKES as f64 * self.thickness(radius);
     }
 }

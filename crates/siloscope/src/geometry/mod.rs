@@ -4,6 +4,7 @@ pub mod camera;
 pub mod convex_vessel;
 pub mod depth_image;
 pub mod evaluator;
+pub mod floor_map;
 pub mod label;
 pub mod normals;
 pub mod parameters;
