@@ -49,18 +49,29 @@ def _courses(content: Content, vessel: Vessel, radius: float, bottom: float, edg
 
 def _obstacles(content: Content, vessel: Vessel, radius: float, edge: float, top: float) -> tuple[float, float]:
     """Volume of the obstacles under the surface and over it, m³, as far as they are inside the vessel."""
-    surface, floor = content.surface, content.floor.map
+    surface = content.surface
     sunk = free = 0.0
     for bar in vessel.obstacles:
         places, each = bar.pieces(edge)
         x, y, z = places.T
-        inside = (np.hypot(x, y) < radius) & (z > top)
-        if floor is not None:
-            inside &= z < floor.at(floor.z, x, y)
+        inside = (np.hypot(x, y) < radius) & (z > top) & (z < _floor(content, x, y, radius, edge))
         under = np.zeros(len(z), np.bool_) if surface is None else z > surface.datum - surface.height(places[:, :2])
         sunk += each * float((inside & under).sum())
         free += each * float((inside & ~under).sum())
     return sunk, free
+
+
+def _floor(
+    content: Content, x: NDArray[np.float64], y: NDArray[np.float64], radius: float, edge: float
+) -> NDArray[np.float64]:
+    """z of the floor at places; endless where nobody knows it."""
+    floor, lengths = content.floor.map, content.lengths
+    if floor is not None:
+        return floor.at(floor.z, x, y)
+    apex = None if lengths is None else lengths.geometry.apex
+    if apex is None:
+        return np.full(len(x), np.inf)
+    return apex - (apex - edge) * np.minimum(np.hypot(x, y) / radius, 1.0)
 
 
 def without_obstacles(prepared: Prepared, known: Knowledge, vessel: Vessel) -> Prepared:
