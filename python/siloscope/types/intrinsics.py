@@ -6,12 +6,25 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from numbers import Real
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 from siloscope.errors import InputError, UsageError
 
-if TYPE_CHECKING:
-    from siloscope.types.camera import Camera
+
+class Pinhole(Protocol):
+    """What of a camera brings its intrinsics' deviations to the image."""
+
+    @property
+    def width(self) -> int:
+        """Pixels across."""
+
+    @property
+    def fx(self) -> float:
+        """Focal length across, pixels."""
+
+    @property
+    def fy(self) -> float:
+        """Focal length down, pixels."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +62,7 @@ class IntrinsicsStd:
         """Of the same camera's image at another size: the principal point's goes with the pixels."""
         return replace(self, c=self.c * by)
 
-    def of_rays(self, camera: Camera) -> tuple[float, float, float, float, float]:
+    def of_rays(self, camera: Pinhole) -> tuple[float, float, float, float, float]:
         """Of fx and fy (relative), of cx and cy in units of the rays, and of k1."""
         return self.f, self.f, self.c / camera.fx, self.c / camera.fy, self.k1
 
@@ -70,7 +83,7 @@ NOMINAL_F, NOMINAL_C, NOMINAL_K1 = 0.02, 0.01, 0.03
 NAMES = ("exact", "calibrated", "nominal")
 
 
-def named(name: str, camera: Camera) -> IntrinsicsStd:
+def named(name: str, camera: Pinhole) -> IntrinsicsStd:
     """The standard deviations of a name: exact, calibrated or nominal.
 
     Raises
