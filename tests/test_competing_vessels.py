@@ -27,7 +27,7 @@ def true_camera(taken: Sample) -> siloscope.Camera:
 
 def answered(
     folder: Path, kind: str, seed: int, vessels: str = "any", **known: Any
-) -> tuple[Verdict, dict[str, object]]:
+) -> tuple[Verdict, dict[str, Any]]:
     taken = single(folder, kind, seed, 320)
     depth = taken.depth.astype(np.float32) * 1e-3
     told = {"sensor": taken.truth["sensor"], "intrinsics": "exact", "vessels": vessels, **known}
@@ -116,3 +116,13 @@ def test_what_shows_enough_wall_is_answered(kind: str, tmp_path: Path) -> None:
     verdicts = [answered(tmp_path, kind, seed)[0] for seed in SEEDS]
     assert sum(verdict.answered for verdict in verdicts) >= 2
     assert not any(verdict.wrong for verdict in verdicts)
+
+
+def test_only_a_silos_own_cone_is_called_its_bottom(tmp_path: Path) -> None:
+    bottoms = {kind: answered(tmp_path, kind, 101)[1]["silo"]["bottom"] for kind in ("control", "oblique", "flat_ring")}
+    cone = bottoms["control"]
+    assert cone["kind"] == "cone"
+    assert 0.0 < cone["cylinder_bottom"] < cone["apex"]
+    assert cone["std"]["apex"] > 0.0
+    assert {bottoms[kind]["kind"] for kind in ("oblique", "flat_ring")} == {"unknown"}
+    assert bottoms["oblique"]["seen"] in {"oblique-cone", "free-cone"}

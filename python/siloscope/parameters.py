@@ -17,6 +17,9 @@ POSE = PARAMETERS[:4]
 BIAS = PARAMETERS[7:10]
 """Names of the depth bias' parameters: ``measured = d + offset + scale·d + quadratic·d²`` (Eqs. 8 to 10)."""
 
+OVALITY = slice(PARAMETERS.index("oval_cos"), SIZE)
+"""Where the radius' second harmonic stands, as fractions of the radius: cosine and sine."""
+
 NOISE = ("floor", "constant", "linear", "quadratic", "power_factor", "power")
 """Names of the noise law's parameters, ``max(floor, constant + linear·d + quadratic·d² + power_factor·d^power)``."""
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.parameters import PARAMETERS, SIZE
+from siloscope.parameters import OVALITY, PARAMETERS, SIZE
 from siloscope.sensors import SensorProfile
 from siloscope.types.pose import SiloPose
 
@@ -20,7 +20,6 @@ GRAVITY_STD = 0.01
 TILT = slice(0, 2)
 RADIUS = PARAMETERS.index("radius")
 DEPTH_BIAS = slice(PARAMETERS.index("offset"), PARAMETERS.index("offset") + 3)
-OVALITY = slice(PARAMETERS.index("oval_cos"), SIZE)
 
 CLOUD = SensorProfile("none: a cloud is taken as it is")
 """A cloud has no rays along which a depth could be biased."""

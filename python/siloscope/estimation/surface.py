@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
-from siloscope.estimation.priors import DEPTH_BIAS, OVALITY, Priors
+from siloscope.estimation.priors import DEPTH_BIAS, Priors
 from siloscope.estimation.steps import cell_size
-from siloscope.parameters import BIAS, PARAMETERS
+from siloscope.parameters import BIAS, OVALITY, PARAMETERS
 from siloscope.types.camera import Camera
 from siloscope.types.depth_frame import DepthFrame
 from siloscope.types.estimate import Estimate, PixelLabels, SurfaceDetails, ratios_of, refused, timing_ms

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.parameters import PARAMETERS
+from siloscope.parameters import OVALITY, PARAMETERS
 from siloscope.reasons import FRAME_STATUSES
 from siloscope.schema import CALIBRATION
 from siloscope.types.by_value import ByValue
@@ -19,7 +19,7 @@ from siloscope.types.floor import Floor, FloorMap, SeenCone
 from siloscope.types.frame_factor import FrameFactor, SummedFactor
 from siloscope.types.move import Move
 from siloscope.types.pose import SiloPose
-from siloscope.types.vessel import SiloGeometry
+from siloscope.types.vessel import SiloGeometry, vessel_to_dict
 
 if TYPE_CHECKING:
     from siloscope.schema.calibration import CalibrationDocument, Record
@@ -188,7 +188,7 @@ class Calibration(ByValue):
                 "direction": None if pose is None else pose.axis_direction.tolist(),
                 "point": None if pose is None else pose.axis_point.tolist(),
             },
-            "silo": {**self.silo.to_dict(), "std": self.silo_std.to_dict()},
+            "silo": vessel_to_dict(self.silo, self.silo_std, self._ovality(), self.floor.to_dict()),
             "floor": {**self.floor.to_dict(), "map": None if self.floor.map is None else self.floor.map.to_dict()},
             "ratios": {"pixels": None, "area": None},
             "parameters": self._parameters(),
@@ -203,6 +203,10 @@ class Calibration(ByValue):
             "timing_ms": self.timing_ms,
             "evidence": self.evidence.to_dict(),
         }
+
+    def _ovality(self) -> float | None:
+        values = None if self.parameters is None else self.parameters[OVALITY]
+        return float(np.hypot(*values)) if values is not None and np.isfinite(values).all() else None
 
     def _parameters(self) -> dict[str, Any] | None:
         """All parameters with their covariance; what was not seen is null."""

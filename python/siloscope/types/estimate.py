@@ -16,7 +16,7 @@ from siloscope.types.by_value import ByValue, same
 from siloscope.types.depth_frame import DepthFrame
 from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
-from siloscope.types.vessel import SiloGeometry
+from siloscope.types.vessel import SiloGeometry, vessel_to_dict
 
 
 @dataclass(frozen=True)
@@ -178,7 +178,7 @@ class Estimate(ByValue):
                 "direction": None if pose is None else pose.axis_direction.tolist(),
                 "point": None if pose is None else pose.axis_point.tolist(),
             },
-            "silo": {**self.silo.to_dict(), "std": self.silo_std.to_dict()},
+            "silo": vessel_to_dict(self.silo, self.silo_std, self.extra.get("fit", {}).get("ovality"), self._bottom()),
             "ratios": {
                 "pixels": self.pixel_ratios.to_dict() if self.pixel_ratios else None,
                 "area": self.area_ratios.to_dict() if self.area_ratios else None,
@@ -187,6 +187,14 @@ class Estimate(ByValue):
             "config": self.config,
             "timing_ms": self.timing_ms,
         }
+
+    def _bottom(self) -> dict[str, Any]:
+        """A cone that is the silo's own; else unknown, with the model of the conical surface seen, if any."""
+        if self.silo.apex is not None:
+            return {"kind": "cone"}
+        models = self.extra.get("models")
+        seen = models[0]["model"] if models and models[0]["model"] != "cylinder" else None
+        return {"kind": "unknown", "seen": seen}
 
 
 def refused(method: str, refusal: _core.Refusal, config: dict[str, Any] | None) -> Estimate:

@@ -55,6 +55,21 @@ def to_plain(lengths: Lengths) -> dict[str, Any]:
     return {**geometry.to_dict(), "top": lengths.top, "top_from": lengths.top_from}
 
 
+def vessel_to_dict(
+    silo: SiloGeometry, std: SiloGeometry, ovality: float | None, bottom: dict[str, Any]
+) -> dict[str, Any]:
+    """The contract's ``silo`` of an estimate or a calibration.
+
+    ``ovality`` is the amplitude of the radius' second harmonic over the radius; ``courses`` is null, for frames alone
+    tell no courses; ``bottom`` has a kind, and for a cone its heights.
+    """
+    heights = ("cylinder_bottom", "apex")
+    if silo.apex is not None:
+        bottom |= {name: getattr(silo, name) for name in heights}
+        bottom["std"] = {name: getattr(std, name) for name in heights}
+    return {**silo.to_dict(), "courses": None, "ovality": ovality, "bottom": bottom, "std": std.to_dict()}
+
+
 def geometry_of(
     radius: float | None, cone: tuple[float, float] | None, covariance: NDArray[np.float64]
 ) -> tuple[SiloGeometry, SiloGeometry]:
