@@ -23,6 +23,7 @@ pub mod select;
 pub mod solve;
 pub mod summary;
 pub mod system;
+pub mod wall_line;
 
 use crate::SiloPose;
 use crate::Vec3;
