@@ -110,6 +110,9 @@ fuzz: build ## mutates a good file of every format 10,000 times; over an hour
 bench: build ## times every step of locate, a PNG decode beside it
 	$(BIN)/python benchmarks/locate.py
 
+reality: build ## answers the real recordings at hand, beside what is known of them: a page in build/reality
+	$(BIN)/python -m benchmarks.reality
+
 docs: build ## builds the documentation into site/
 	$(BIN)/mkdocs build --strict
 
@@ -145,7 +148,7 @@ format: $(VENV)/.installed ## formats all code
 clean: ## removes what was built, but not .venv
 	rm -rf target build dist site demo $(PAGE) web/node_modules
 
-.PHONY: results peers services monitor-proof
+.PHONY: results peers services monitor-proof reality
 
 SERVICES := postgresql-15 mosquitto mbpoll prometheus nginx-light chromium
 
