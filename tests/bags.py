@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import struct
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
@@ -145,6 +145,7 @@ def orbbec(
     properties: dict[int, bytes] | None = None,
     accel: NDArray[np.float64] | None = None,
     encoding: str = "mono16",
+    packed: Callable[[NDArray[np.uint16]], bytes] = lambda raw: raw.astype("<u2").tobytes(),
     camera: str = "cam",
     fx: float = 57.0,
     distortion: tuple[float, ...] = (0.0,) * 8,
@@ -154,7 +155,7 @@ def orbbec(
     raws: list[tuple[str, str, bytes]] = []
     frames = list(frames)
     for number, raw in enumerate(frames):
-        image = _orbbec_image(raw, number, unit, bit_size, encoding)
+        image = _orbbec_image(raw.shape, packed(raw), number, unit, bit_size, encoding)
         raws.append((f"/{camera}/sensor_3/frameType_3", "sensor_msgs/msg/Image", image))
     if accel is not None:
         raws.append((f"/{camera}/sensor_4/frameType_4", "sensor_msgs/msg/Imu", _orbbec_imu(accel)))
@@ -188,9 +189,10 @@ def _text(text: str) -> bytes:
     return struct.pack("<I", len(text)) + text.encode()
 
 
-def _orbbec_image(raw: NDArray[np.uint16], number: int, unit: float | None, bit_size: bool, encoding: str) -> bytes:
-    height, width = raw.shape
-    pixels = raw.astype("<u2").tobytes()
+def _orbbec_image(
+    shape: tuple[int, ...], pixels: bytes, number: int, unit: float | None, bit_size: bool, encoding: str
+) -> bytes:
+    height, width = shape
     data = _head() + struct.pack("<II", height, width) + _text(encoding) + struct.pack("<BI", 0, width * 2)
     data += struct.pack("<I", len(pixels)) + pixels
     if unit is None:

@@ -119,6 +119,18 @@ def _livox(version: int, packages: Iterable[bytes]) -> bytes:
     return data
 
 
+def lvx_1_0(devices: int) -> bytes:
+    """An LVX of version 1.0: one byte beside its head, devices of so many bytes, packages as in 1.1."""
+    head = b"livox_tech".ljust(16, b"\0") + bytes([1, 0, 0, 0]) + struct.pack("<IB", 0xAC0EA767, 2)
+    data = head + bytes(2 * devices)
+    for number, (points, time_ns) in enumerate(zip(LIVOX, TIMES_NS, strict=True)):
+        rows = np.zeros(100, [("xyz", "<i4", 3), ("reflectivity", "u1")])
+        rows["xyz"][:96] = points
+        content = struct.pack("<5BIBBQ", 0, 5, 1, 1, 0, 0, 0, 0, time_ns) + rows.tobytes()
+        data += struct.pack("<QQQ", len(data), len(data) + 24 + len(content), number) + content
+    return data
+
+
 def _tagged(points: NDArray[np.int32], tags: NDArray[np.uint8]) -> bytes:
     rows = np.zeros(len(points), [("xyz", "<i4", 3), ("reflectivity", "u1"), ("tag", "u1")])
     rows["xyz"], rows["tag"] = points, tags
@@ -167,6 +179,7 @@ MAKERS: dict[str, Callable[[], bytes]] = {
     "mesh.off": off,
     "scan.lvx": lvx,
     "polar.lvx": polar_lvx,
+    "old.lvx": lambda: lvx_1_0(58),
     "scan.lvx2": lvx2,
     "bag.mcap.zstd": lambda: zstandard.compress(recording_files.ros2(mcap=True)),
     "bag.db3.zst": lambda: zstandard.compress(recording_files.ros2(mcap=False)),

@@ -154,3 +154,29 @@ def test_a_calibration_beside_and_given_is_told(tmp_path: Path) -> None:
         frame = next(iter(source))
         assert source.describe()["camera"]["fx"] == 281.5 / 2
     assert re.fullmatch("given, scaled from 320 x 240", frame.provenance["camera_from"])
+
+
+@pytest.mark.parametrize("names", [("mtx", "dist"), ("camera_matrix", "dist_coeffs"), ("K", "D")])
+def test_calibrations_stored_by_numpy_are_read(tmp_path: Path, names: tuple[str, str]) -> None:
+    matrix = np.array([[310.5, 0.0, 161.2], [0.0, 309.8, 118.9], [0.0, 0.0, 1.0]])
+    coefficients = np.array([[0.1, -0.02, 0.001, 0.002, 0.0]])
+    extra = {"rvecs": np.zeros((3, 3, 1))}
+    np.savez(tmp_path / "calib.npz", **{names[0]: matrix, names[1]: coefficients}, **extra)
+    camera = camera_files.load(tmp_path / "calib.npz", (320, 240))
+    assert (camera.fx, camera.fy, camera.cx, camera.cy) == (310.5, 309.8, 161.2, 118.9)
+    assert camera.distortion[:4] == (0.1, -0.02, 0.001, 0.002)
+    np.save(tmp_path / "K.npy", matrix)
+    assert camera_files.load(tmp_path / "K.npy", (320, 240)).fx == 310.5
+
+
+def test_numpy_files_that_are_no_calibration_are_named(tmp_path: Path) -> None:
+    np.savez(tmp_path / "frames.npz", depth=np.zeros((4, 4)))
+    np.save(tmp_path / "text.npy", np.array("K"))
+    np.savez(tmp_path / "long.npz", K=np.zeros((600, 600)))
+    whole = (tmp_path / "frames.npz").read_bytes()
+    (tmp_path / "cut.npz").write_bytes(whole[: len(whole) // 2])
+    causes = {"frames.npz": "has depth, no camera matrix", "text.npy": "no camera matrix", "long.npz": "too long",
+              "cut.npz": "damaged"}  # fmt: skip
+    for name, cause in causes.items():
+        with pytest.raises(InputError, match=f"{name}: .*{cause}"):
+            camera_files.load(tmp_path / name, (320, 240))

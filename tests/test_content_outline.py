@@ -78,7 +78,7 @@ def test_the_pose_s_deviation_is_in_the_volume_s(tmp_path: Path) -> None:
 
 
 def test_without_a_pose_there_is_nothing_to_go_by(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match="--pose"):
+    with pytest.raises(UsageError, match="pose"):
         siloscope.measure(siloscope.Frame(points=heap()), vessel=_vessel(tmp_path))
     with pytest.raises(UsageError, match="outline"):
         siloscope.measure(siloscope.Frame(points=heap()), pose=siloscope.SiloPose(0.0, 0.0, 0.0, 0.0))

@@ -152,7 +152,7 @@ BAD_ARRAYS = {
     "zip bomb": (zipped("depth.npy", header("(19000, 5000)") + b"\0" * 4096, declared=19_000 * 5_000 * 2), "hostile"),
     "false size": (zipped("depth.npy", header("(64, 48)") + b"\0" * 100, declared=6400), "breaks off|can't be dec"),
     "encrypted": (zipped("depth.npy", made.npy(made.RAW), flags=1), "encrypted"),
-    "two arrays": (made.npz(left=made.RAW, right=made.RAW), "give --stream NAME"),
+    "two arrays": (made.npz(left=made.RAW, right=made.RAW), "give stream"),
     "no frames": (made.npz(camera="{}"), "which array"),
     "broken camera": (made.npz(depth=made.RAW, camera="{"), "not valid JSON"),
     "three gravities": (made.npz(depth=made.RAW, gravity=[1, 2]), "'gravity' must be three"),

@@ -49,7 +49,7 @@ def test_the_user_s_camera_and_unit_win(folder: Path, tmp_path: Path) -> None:
 
 def test_two_different_cameras_beside_are_not_chosen_between(folder: Path) -> None:
     camera_files.dump(OTHER, folder / "intrinsics.toml")
-    with pytest.raises(InputError, match=r"camera\.json, intrinsics\.toml.*--camera"):
+    with pytest.raises(InputError, match=r"camera\.json, intrinsics\.toml.*camera"):
         siloscope.open(folder)
     assert len(list(siloscope.open(folder, camera=OTHER, depth_unit=0.001))) == 3
 

@@ -156,6 +156,14 @@ def test_bad_meshes_are_refused(tmp_path: Path, content: bytes, cause: str) -> N
     assert cause in refusal(put(tmp_path, content, "bad.mesh"))
 
 
+@pytest.mark.parametrize("devices", [58, 59])
+def test_livox_recordings_of_version_1_0_are_found_by_their_first_frame(tmp_path: Path, devices: int) -> None:
+    with siloscope.open(put(tmp_path, made.lvx_1_0(devices), "old.lvx")) as source:
+        frames = list(source)
+    assert sum(len(np.asarray(frame.points)) for frame in frames) == made.LIVOX[..., 0].size
+    assert np.allclose(np.asarray(frames[-1].points), made.LIVOX[2] / 1000, atol=1e-6)
+
+
 @pytest.mark.parametrize(("content", "dust"), [(made.lvx(), (5, 6, 7)), (made.lvx2(), (6, 7))])
 def test_livox_leaves_dust_out_and_gives_a_frame_a_second(
     tmp_path: Path, content: bytes, dust: tuple[int, ...]
@@ -190,7 +198,7 @@ def test_a_cut_livox_recording_gives_what_is_there(tmp_path: Path) -> None:
         frames = list(source)
         assert len(frames) == 1
         assert "cut off" in source.problems[-1]
-    assert "version 1.0" in refusal(put(tmp_path, made.lvx()[:17] + b"\0" + made.lvx()[18:], "old.lvx"))
+    assert "version 1.0 without a frame" in refusal(put(tmp_path, made.lvx_1_0(40), "old.lvx"))
     assert "another version" in refusal(put(tmp_path, made.lvx()[:20] + bytes(60), "short.lvx"))
 
 

@@ -38,7 +38,7 @@ def test_a_png_gives_its_raw_units(png: Path) -> None:
 
 
 def test_a_missing_unit_is_asked_for(png: Path) -> None:
-    with pytest.raises(InputError, match="--depth-unit"):
+    with pytest.raises(InputError, match="give depth_unit"):
         list(siloscope.open(png))
 
 
@@ -106,7 +106,7 @@ def test_frames_decoded_ahead_can_be_left_in_the_middle(png: Path) -> None:
 
 
 def test_a_missing_unit_is_asked_for_by_frames_decoded_ahead_too(png: Path) -> None:
-    with ThreadPoolExecutor(2) as pool, pytest.raises(InputError, match="--depth-unit"):
+    with ThreadPoolExecutor(2) as pool, pytest.raises(InputError, match="give depth_unit"):
         list(siloscope.open([png] * 3).ahead(pool, 4))
 
 

@@ -56,7 +56,7 @@ BAD_TABLES = {
     "which columns": ("1 1.5 2.5 3.5\n2 4.5 5.5 6.5\n", "can't tell which of the 4 columns"),
     "words and more": ("a 1.5 2.5 3.5 4.5\n", "can't tell which"),
     "other names": ("range,azimuth,height\n1.5,2.5,3.5\n", "no columns x, y and z among range"),
-    "whole numbers": ("1500 2500 3500\n4000 5000 6000\n", "--depth-unit"),
+    "whole numbers": ("1500 2500 3500\n4000 5000 6000\n", "depth_unit"),
     "short line": ("1.5,2.5,3.5\n4.5,5.5\n", "below line 1"),
     "row without its label": ("1.5 2.5 3.5 wall\n" * 3 + "4.5 5.5 6.5\n", "column"),
     "word": ("1.5,2.5,3.5\n" * 1500 + "4.5,x,6.5\n" + "1.5,2.5,3.5\n" * 1500, "'x'"),

@@ -62,7 +62,7 @@ BAD: dict[str, tuple[Any, dict[str, Any], type[SiloscopeError], str]] = {
     "empty": (np.ones((0, 160)), {}, InputError, "empty"),
     "line": (np.ones(160), {}, InputError, "shape"),
     "four channels": (np.ones((120, 160, 4)), {}, InputError, "shape"),
-    "raw without unit": (np.ones((120, 160), np.uint16), {}, InputError, "--depth-unit"),
+    "raw without unit": (np.ones((120, 160), np.uint16), {}, InputError, "give depth_unit"),
     "raw with a wild unit": (np.ones((120, 160), np.uint16), {"depth_unit": 50.0}, InputError, "unit"),
     "millimetres as floats": (np.full((120, 160), 3000.0), {}, InputError, "millimetres"),
     "all NaN": (np.full((120, 160), np.nan), {}, InputError, "invalid"),
@@ -85,7 +85,6 @@ BAD: dict[str, tuple[Any, dict[str, Any], type[SiloscopeError], str]] = {
     "no gravity": (DEPTH, {"gravity": (0, 0, 0)}, UsageError, "gravity"),
     "gravity in words": (DEPTH, {"gravity": "down"}, UsageError, "gravity"),
     "endless gravity": (DEPTH, {"gravity": (1e308, 1e308, 1e308)}, UsageError, "gravity"),
-    "an accelerometer's reading": (DEPTH, {"gravity": (0.1, 0.2, -9.8)}, UsageError, "turn all three signs"),
     "no threads": (DEPTH, {"threads": 0}, UsageError, "threads"),
     "threads that are none": (DEPTH, {"threads": float("nan")}, UsageError, "threads"),
 }
@@ -99,7 +98,7 @@ def test_bad_input_is_refused_by_name(name: str) -> None:
 
 
 def test_depth_without_any_camera_is_refused() -> None:
-    with pytest.raises(InputError, match="--camera"):
+    with pytest.raises(InputError, match="camera"):
         siloscope.locate(DEPTH)
 
 

@@ -11,6 +11,7 @@ import pytest
 
 import bags
 import siloscope
+from foxglove_files import rvl
 from siloscope import Camera, InputError
 
 RAWS = list(np.random.default_rng(6).integers(0, 65536, (3, 48, 64), dtype=np.uint16))
@@ -78,15 +79,25 @@ def test_gravity_goes_through_the_accelerometers_extrinsics(tmp_path: Path) -> N
 @pytest.mark.parametrize("fx", [0.0, float("nan")])
 def test_nan_and_zero_intrinsics_are_refused_by_name_but_the_users_win(tmp_path: Path, fx: float) -> None:
     path = bags.orbbec(tmp_path / "o.bag", RAWS, fx=fx)
-    with pytest.raises(InputError, match=r"stream profile: .*--camera"):
+    with pytest.raises(InputError, match=r"stream profile: .*camera"):
         siloscope.open(path)
     camera = Camera(64, 48, 57.0, 57.0, 31.5, 23.5)
     assert next(iter(siloscope.open(path, camera=camera))).camera == camera
 
 
 def test_an_encoding_that_is_not_read_is_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="'RVL', which is not read; record with format Y16"):
-        list(siloscope.open(bags.orbbec(tmp_path / "o.bag", RAWS, encoding="RVL")))
+    with pytest.raises(InputError, match="'RLE', which is not read; record with format Y16"):
+        list(siloscope.open(bags.orbbec(tmp_path / "o.bag", RAWS, encoding="RLE")))
+
+
+def test_rvl_is_unpacked_and_damaged_rvl_is_named(tmp_path: Path) -> None:
+    source = siloscope.open(bags.orbbec(tmp_path / "rvl.bag", RAWS, unit=0.001, encoding="RVL", packed=rvl))
+    for frame, raw in zip(source, RAWS, strict=True):
+        assert np.array_equal(np.asarray(frame.depth), raw)
+        assert frame.depth_unit == pytest.approx(0.001)
+    cut = bags.orbbec(tmp_path / "cut.bag", RAWS, encoding="RVL", packed=lambda raw: rvl(raw)[:40])
+    with pytest.raises(InputError, match="damaged RVL"):
+        list(siloscope.open(cut))
 
 
 def test_sdk_version_1_calls_its_camera_cam0(tmp_path: Path) -> None:

@@ -34,7 +34,7 @@ def test_raw_depth_is_scaled_and_its_holes_are_nan() -> None:
 
 
 def test_image_without_camera_is_refused() -> None:
-    with pytest.raises(InputError, match="--camera"):
+    with pytest.raises(InputError, match="camera"):
         frame_points(Frame(depth=np.ones((3, 4)), source="f.png"))
 
 

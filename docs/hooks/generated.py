@@ -123,6 +123,11 @@ def content_quality() -> str:
     return "\n".join(["| code | what it means | what to do | |", "|---|---|---|---|", *rows])
 
 
+def input_quality() -> str:
+    """Every remark on the inputs of a frame."""
+    return _advice(import_module("siloscope.reasons").INPUT_REMARKS).replace("| reason |", "| code |", 1)
+
+
 def products() -> str:
     """Every product that comes with siloscope."""
     from siloscope.content import products as known
@@ -143,5 +148,5 @@ _PARTS |= {
     "calibration_reasons": calibration_reasons,
     "frame_statuses": frame_statuses,
 }
-_PARTS |= {"content_quality": content_quality, "products": products}
+_PARTS |= {"content_quality": content_quality, "input_quality": input_quality, "products": products}
 _PARTS |= {"changes": partial(from_root, "CHANGELOG.md"), "design": partial(from_root, "DESIGN.md")}

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
+from functools import partial
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from siloscope.errors import UsageError
+from siloscope.estimation.contradictions import trusted
 from siloscope.fusion.counted import UncountedFrames
 from siloscope.fusion.history import History
 from siloscope.fusion.report import calibration_of
@@ -20,12 +23,14 @@ from siloscope.fusion.settings import brought_settings, common_camera, settings_
 from siloscope.io import FrameSource
 from siloscope.io.given import given_frames
 from siloscope.locate import locate
+from siloscope.reasons import INPUT_REMARKS
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
 from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
 from siloscope.vessel.floor import calibrated_floor
+from siloscope.wording import counted
 
 RULES = ("information", "mean-of-last-10")
 """How frames become one: weighed by their information, or the mean of the last 10 answers (section 2.4.4)."""
@@ -46,6 +51,7 @@ def calibrate(
     continue_from: Calibration | Pathlike | None = None,
     rule: str = "information",
     jobs: int = 1,
+    trust: str | Sequence[str] = (),
     progress: Callable[[Iterable[Any]], Iterable[Any]] | None = None,
 ) -> Calibration:
     """Fuse the frames of one camera in one silo to the camera's pose and the silo's geometry.
@@ -70,6 +76,8 @@ def calibrate(
         One of `RULES`.
     jobs : int
         Frames located at the same time.
+    trust : str or sequence of str
+        As for `locate`: what to go by although frames contradict it.
     progress : callable, optional
         Is given the frames and gives them on, to show how far it has come.
 
@@ -93,7 +101,7 @@ def calibrate(
     before = Calibration.load(continue_from) if isinstance(continue_from, str | PathLike) else continue_from
     settings = settings_of(before, sensor=sensor, diameter=diameter, gravity=gravity)
     source = given_frames(frames, camera, depth_unit)
-    one = FrameLocator(locate, camera, depth_unit, settings)
+    one = FrameLocator(partial(locate, trust=tuple(sorted(trusted(trust)))), camera, depth_unit, settings)
     ahead = 0 if jobs == 1 else 2 * jobs
     with pool_of(jobs) as pool:
         read = source.ahead(pool, ahead) if isinstance(source, FrameSource) and not isinstance(pool, Inline) else source
@@ -107,5 +115,17 @@ def calibrate(
     config["camera"] = common_camera(before, answers)
     found = calibration_of(History.of(before).extended(answers, lost), rule, config)
     times = {"frames": 1e3 * (read_until - start), "fusion": 1e3 * (time.perf_counter() - read_until)}
+    found = _with_what_inputs_say(found, [answer.estimate for answer in answers if answer.estimate is not None])
     quality = (*found.quality, *uncounted.remarks)
     return replace(found, timing_ms=times, quality=quality, floor=calibrated_floor(found, bottom, before))
+
+
+def _with_what_inputs_say(found: Calibration, estimates: list[Estimate]) -> Calibration:
+    """The calibration with the frames' warnings of their inputs, and with the contradiction that refused them."""
+    warned = (remark.code for one in estimates if one.ok for remark in one.quality if remark.severity == "warning")
+    against = Counter(one.reason for one in estimates if one.reason in INPUT_REMARKS)
+    if not found.ok and against:
+        (code, count), *_ = against.most_common(1)
+        first = next(one for one in estimates if one.reason == code)
+        found = replace(found, message=f"{found.message} {counted(count, 'frame')}: {first.message}")
+    return replace(found, quality=(*found.quality, *dict.fromkeys(warned)))

@@ -2,11 +2,37 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_OPTION = re.compile(r"--([a-z][a-z-]*)(?: (?:FILE|NAME|DIR|FRAME|KIND|M)\b)?")
+
+
+class _Speech:
+    """Whether messages name the command line's options, or the arguments of functions."""
+
+    options = False
+
+
+@contextmanager
+def naming_options() -> Iterator[None]:
+    """Messages name options while a command runs: ``--depth-unit`` where Python has ``depth_unit``."""
+    before, _Speech.options = _Speech.options, True
+    try:
+        yield
+    finally:
+        _Speech.options = before
+
 
 class SiloscopeError(Exception):
     """Base of all errors raised by siloscope."""
 
     exit_code = 1
+
+    def __str__(self) -> str:
+        text = super().__str__()
+        return text if _Speech.options else _OPTION.sub(lambda found: found[1].replace("-", "_"), text)
 
 
 class UsageError(SiloscopeError, ValueError):

@@ -3,31 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from os import PathLike
 from pathlib import Path
 
 from numpy.typing import ArrayLike
 
 from siloscope import sensors
 from siloscope.errors import UsageError
+from siloscope.estimation import contradictions, second_look
+from siloscope.estimation.input_checks import input_remarks
 from siloscope.estimation.inputs import prepare
 from siloscope.estimation.methods import METHODS
 from siloscope.estimation.settings import Number, Settings
 from siloscope.estimation.steps import NEIGHBOURS
+from siloscope.estimation.vessel_checks import vessel_remarks
+from siloscope.io.given import given_frame
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
 from siloscope.types.intrinsics import IntrinsicsStd
+from siloscope.vessel.vessel import Vessel, given
 
 
 def locate(
-    data: Frame | ArrayLike,
+    data: Frame | ArrayLike | str | PathLike[str],
     camera: Camera | None = None,
     *,
     method: str = "surface",
     sensor: str | Path | SensorProfile | None = None,
     depth_unit: Number = None,
     diameter: Number = None,
+    vessel: Vessel | str | Path | None = None,
     gravity: ArrayLike | None = None,
     mask: ArrayLike | None = None,
     crop: Sequence[float] | None = None,
@@ -38,14 +45,16 @@ def locate(
     ratios: bool = True,
     intrinsics: str | IntrinsicsStd | None = None,
     vessels: str = "any",
+    trust: str | Sequence[str] = (),
 ) -> Estimate:
     """Find the silo's axis in one frame, and with it the camera's pose (Eqs. 5–7).
 
     Parameters
     ----------
-    data : Frame, or array
-        A depth image (H, W), floats in metres or unsigned integers in raw units; or points (N, 3) or (H, W, 3) in the
-        camera frame, metres. 0, NaN, negative depths and raw 65535 are "no measurement".
+    data : Frame, path, or array
+        A depth image (H, W), floats in metres or unsigned integers in raw units; points (N, 3) or (H, W, 3) in the
+        camera frame, metres; or a file whose first frame counts. 0, NaN, negative depths and raw 65535 are "no
+        measurement".
     camera : Camera, optional
         Intrinsics; wins over the frame's own. Without any, the sensor profile's nominal ones for the image's size.
     method : {"surface", "shape-tensor"}
@@ -56,8 +65,10 @@ def locate(
         Metres per raw unit; required for integer depth whose frame does not tell.
     diameter : float, optional
         Inner diameter of the silo's cylinder in metres, which fixes the scale of a sensor that is not known.
+    vessel : Vessel or path, optional
+        A vessel file (`siloscope.vessel.vessel.load`): its diameter counts, its bottom is held against the frame.
     gravity : array (3,), optional
-        Direction of gravity in the camera frame, any length; z is positive, as the camera looks down.
+        Direction of gravity in the camera frame, any length; for a cloud in its file's frame.
     mask : array of bool, optional
         True where the silo is, of the frame's shape.
     crop : (xmin, xmax, ymin, ymax, zmin, zmax), optional
@@ -79,6 +90,9 @@ def locate(
     vessels : {"any", "coaxial"}
         Which vessels may be in view (method ``surface``, depth images from inside): those of the joint fit, which
         compete, or a cylinder on a coaxial cone seen through exact intrinsics, the model in which frames are fused.
+    trust : str or sequence of {"range", "camera", "bias", "diameter", "gravity"}
+        What to go by although it contradicts the sensor's profile or the frame by more than 5 standard deviations;
+        the contradiction then is a warning in `Estimate.quality`, where it would be a refusal.
 
     Returns
     -------
@@ -95,10 +109,10 @@ def locate(
     run = METHODS.get(method)
     if run is None:
         raise UsageError(f"unknown method '{method}'; known are {', '.join(METHODS)}")
-    profile = sensors.load(sensor)
+    profile, sheet = sensors.load(sensor), given(vessel, None, diameter=diameter).sheet
     settings = Settings.checked(
         profile,
-        diameter=diameter,
+        diameter=sheet.diameter,
         gravity=gravity,
         grid=grid,
         neighbours=neighbours,
@@ -107,7 +121,19 @@ def locate(
         ratios=ratios,
         intrinsics=intrinsics,
         vessels=vessels,
+        trust=trust,
     )
-    prepared = prepare(data, camera, profile, depth_unit=depth_unit, mask=mask, crop=crop)
+    data = given_frame(data, camera, depth_unit)
+    clouds = "resampled" if method == "surface" and grid is None else "points"
+    prepared = prepare(data, camera, profile, depth_unit=depth_unit, mask=mask, crop=crop, clouds=clouds)
     settings = settings.with_gravity_of(prepared)
-    return run(prepared, settings, settings.effective(method, prepared))
+    config = settings.effective(method, prepared)
+    found = input_remarks(data, prepared, profile, depth_unit)
+    against = contradictions.refused(method, found, settings.trust, config)
+    if against is not None:
+        return against
+    estimate = run(prepared, settings, config)
+    if method == "surface":
+        estimate, more = second_look.looked_at_again(run, estimate, prepared, settings)
+        found = (*found, *more, *vessel_remarks(estimate, sheet))
+    return contradictions.judged(estimate, found, settings.trust)

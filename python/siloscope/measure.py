@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
@@ -11,15 +12,17 @@ from numpy.typing import ArrayLike
 
 from siloscope import sensors
 from siloscope.calibrate import calibrate
+from siloscope.content.alone import ALONE, unlocated
 from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density, choose
 from siloscope.content.knowledge import know
 from siloscope.content.outlined import PlacedPose, outlined
-from siloscope.content.reading import source_of, unlocated
+from siloscope.content.reading import source_of
 from siloscope.content.silo_content import SiloContent
 from siloscope.content.units import at_moisture
 from siloscope.errors import UsageError
 from siloscope.estimation.inputs import prepare
+from siloscope.io.given import given_frame
 from siloscope.locate import locate
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
@@ -30,12 +33,9 @@ from siloscope.types.pose import SiloPose
 from siloscope.vessel.floor import STEEPEST_REPOSE
 from siloscope.vessel.vessel import Vessel, given
 
-ALONE = "pose and silo from this frame alone, without a calibration"
-"""What is assumed where no calibration is given."""
-
 
 def measure(
-    data: Frame | ArrayLike,
+    data: Frame | ArrayLike | str | PathLike[str],
     calibration: Calibration | str | PathLike[str] | None = None,
     camera: Camera | None = None,
     *,
@@ -59,6 +59,7 @@ def measure(
     pose_std: tuple[float, float] | None = None,
     mask: ArrayLike | None = None,
     previous: Content | None = None,
+    trust: str | Sequence[str] = (),
 ) -> Content:
     """Measure what is in the silo: surface, level, volume, fill and mass, each with its standard deviation.
 
@@ -72,24 +73,21 @@ def measure(
     calibration : Calibration or path, optional
         Pose and geometry. Without one the frame itself has to show them: it is located first, and `assumed` says so.
     camera : Camera, optional
-        Intrinsics; wins over the frame's own, and those over the calibration's.
+        Intrinsics; wins over the frame's own, and those over the calibration's. `trust` is as for `siloscope.locate`.
     sensor : str, path or SensorProfile, optional
-        Sensor profile; the calibration's where not given.
-    depth_unit : float, optional
-        Metres per raw unit of integer depth.
+        Sensor profile; the calibration's where not given. `depth_unit`: metres per raw unit of integer depth.
     diameter, cylinder, cone : float, optional
         Inner lengths of a datasheet, m: diameter, height of the cylinder, height of the cone, 0 for a flat floor. They
         fill in what the calibration has not seen and tell the silo's upper edge. Without a calibration, the diameter
         also fixes the depth's scale.
     bottom : str, optional
-        "cone" (the conical surface seen is the bottom, where `cone` is not given), "flat", or "unknown". Without it a
-        conical surface counts as the bottom only if it is steeper than feed can lie.
+        "cone": the conical surface seen, where `cone` is not given; "flat", or "unknown". Without it a conical surface
+        counts as the bottom only if it is steeper than feed can lie.
     top : float, optional
         z of the silo's upper edge below the camera, m (negative above it), up to which it can be filled. From
         `cylinder` where not given, else the camera's own height.
     vessel : Vessel or path, optional
-        A vessel file (`siloscope.vessel.vessel.load`): the lengths above and bottoms of other kinds, courses, roof,
-        fill height, obstacles. Single options win over it.
+        A vessel file (`siloscope.vessel.vessel.load`), over which single lengths win.
     outlet_diameter, outlet_length : float
         Outlet pipe below the cone, m; counts as part of the silo.
     strapping : Strapping or path, optional
@@ -119,7 +117,7 @@ def measure(
     UsageError
         For settings that can't be.
     """
-    start = time.perf_counter()
+    data, start = given_frame(data, camera, depth_unit), time.perf_counter()
     chosen = choose(density, density_std, product, test_weight)
     if moisture is not None:
         at_moisture(1.0, moisture, 0.0)
@@ -132,19 +130,19 @@ def measure(
     if pose is not None and about.outline is None:
         raise UsageError("a pose alone bounds no surface; give a vessel file with an outline, or a calibration")
     if about.outline is not None:
-        prepared = prepare(data, camera, profile or sensors.UNKNOWN, depth_unit=depth_unit, mask=mask)
+        prepared = prepare(data, camera, profile or sensors.UNKNOWN, depth_unit=depth_unit, mask=mask, clouds="as is")
         placed = PlacedPose.of(pose, pose_std, calibration)
         return replace(outlined(prepared, placed, about, profile, chosen, source_of(data)), moisture=moisture)
     if calibration is None:
         vessels = "coaxial" if sheet.bottom == "cone" or sheet.cone else "any"  # a cone that is told is not asked for
         estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask,
-                          vessels=vessels)  # fmt: skip
+                          vessels=vessels, trust=trust)  # fmt: skip
         silo = calibrate([estimate], sensor=profile, diameter=sheet.diameter) if estimate.ok else None
         if silo is None or not silo.ok:
-            return unlocated(data, estimate if silo is None else silo)
+            return unlocated(data, estimate if silo is None else silo, source_of(data))
         known = know(silo, profile, sheet, top, None, steepest).assuming(ALONE)
     else:
         silo = calibration if isinstance(calibration, Calibration) else Calibration.load(calibration)
-        known = know(silo, profile, sheet, top, sheet.diameter, steepest)
-    content = SiloContent(silo, about, known, profile, table, chosen, moisture, calibration is None)
+        known, estimate = know(silo, profile, sheet, top, sheet.diameter, steepest), None
+    content = SiloContent(silo, about, known, profile, table, chosen, moisture, estimate, trust)
     return content.measure(data, camera, depth_unit=depth_unit, mask=mask, previous=previous, since=start)

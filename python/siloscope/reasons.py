@@ -88,7 +88,7 @@ CONTENT_REMARKS: dict[str, tuple[str, str]] = {
     ),
     "bottom-unknown": (
         "there is no volume: what lies under the surface is not known",
-        "say what the bottom is (--bottom, --cone, --vessel) or calibrate with frames of the empty vessel (--empty)",
+        "say what the bottom is (bottom, cone or vessel), or calibrate with frames of the empty vessel (empty)",
     ),
     "vessel-contradicted": (
         "what was given of the vessel contradicts what is seen",
@@ -96,7 +96,7 @@ CONTENT_REMARKS: dict[str, tuple[str, str]] = {
     ),
     "radius-unknown": (
         "the silo's radius is not known, so nothing bounds the surface",
-        "give --diameter, say --bottom cone if the cone seen is the bottom, or calibrate with frames of a lower level",
+        "give the diameter, say that the cone seen is the bottom if it is, or calibrate with frames of a lower level",
     ),
     "beyond-range": (
         "the surface lies farther away than the sensor can measure",
@@ -125,11 +125,105 @@ BOTTOM_EVIDENCE = {
 """How a bottom is known."""
 
 
-CONTENT_NOTES = ("partly-seen", "bottom-unknown", "filling-in-progress")
+INPUT_REMARKS: dict[str, tuple[str, str]] = {
+    "outside-sensor-range": (
+        "much of the depth lies where this sensor can't measure",
+        "check depth unit and sensor; trust range takes the depth as it is",
+    ),
+    "unusual-depth-unit": (
+        "the depth unit given is not the one that this sensor's makers set",
+        "check the depth unit against what the recorder was set to",
+    ),
+    "millimetre-depth-unit": (
+        "the depth unit given is a millimetre, which is not this sensor's own",
+        "check that the frame was stored in millimetres, as ROS does",
+    ),
+    "axes-found": (
+        "the points do not lie along the file's z axis, so the cloud was turned to the optical frame",
+        "give axes or up where that is not how the sensor looks",
+    ),
+    "gravity-behind": (
+        "gravity points out of the camera's back, and was turned round",
+        "an accelerometer at rest reads minus gravity: turn all three signs; where the camera looks upwards, z of the "
+        "answer points up",
+    ),
+    "upside-down": (
+        "most of what is seen lies on the other side of the origin than the answer's z points",
+        "give up, the file's axis that points upwards, or gravity",
+    ),
+    "kinect-raw": (
+        "the values look like the first Kinect's raw 11-bit disparity, which is no depth",
+        "record depth in millimetres (libfreenect: FREENECT_DEPTH_MM or FREENECT_DEPTH_REGISTERED)",
+    ),
+    "hole-filled": (
+        "holes of the frame were filled with values from beside them, which nobody measured",
+        "record without post-processing: no hole filling, no spatial filter that fills holes",
+    ),
+    "ray-length-as-depth": (
+        "the values may be lengths of rays, not depths along the optical axis",
+        "renderers and laser scanners write those: read them with ray length",
+    ),
+    "disparity-as-depth": (
+        "the values may be disparities: what is near has large ones",
+        "convert them first: depth = focal length · baseline / disparity",
+    ),
+    "focal-lengths-differ": (
+        "the camera's two focal lengths differ, as those of square pixels don't",
+        "check fx and fy: one of them may be of another stream or resolution",
+    ),
+    "principal-point-aside": (
+        "the camera's principal point lies far from the middle of the image",
+        "check cx, cy, width and height: they may be of another stream or resolution; a cut-out is right so",
+    ),
+    "intrinsics-contradicted": (
+        "the wall is round only with intrinsics far from those given",
+        "check the camera file: it must be that of the depth stream at this size; trust camera keeps the answer",
+    ),
+    "depth-bias-contradicted": (
+        "the wall needs a depth error that this sensor does not have",
+        "check sensor, depth unit and the camera file; trust bias keeps the answer",
+    ),
+    "diameter-contradicted": (
+        "the diameter given contradicts what the sensor measures",
+        "check the tape, the depth unit and the camera file: the colour camera's intrinsics do not fit depth; "
+        "trust diameter takes the diameter's word",
+    ),
+    "gravity-contradicts": (
+        "the silo's axis is not along gravity",
+        "check gravity's signs and that it is in the camera's frame; trust gravity keeps the answer",
+    ),
+}
+"""Codes of what a frame's inputs say against each other: what it means, what to do."""
+
+
+REMARKS = {refusal.slug: (refusal.meaning, refusal.remedy) for refusal in _core.refusals()}
+REMARKS |= INPUT_REMARKS | CONTENT_REMARKS
+"""Every code of a remark on an estimate or a reading: what it means, what to do."""
+
+
+def calibration_remark(code: str) -> dict[str, str]:
+    """A remark on a calibration as plain data: its code, what it means with what to do, and how grave it is."""
+    meaning, advice = REMARKS.get(code, ("", ""))
+    message = CALIBRATION_REMARKS.get(code) or f"{meaning}; {advice}"
+    return {"code": code, "message": message, "severity": "note" if code in NOTES else "warning"}
+
+
+NOTES = (
+    "few-frames",
+    "scale-unknown",
+    "cone-not-seen",
+    "cylinder-not-seen",
+    "partly-seen",
+    "bottom-unknown",
+    "filling-in-progress",
+    "millimetre-depth-unit",
+    "axes-found",
+)
 """Codes that only inform; the others warn."""
 
 
 CONTENT_REFUSALS = (
+    "dust-or-fog",
     "too-little-seen",
     "radius-unknown",
     "beyond-range",

@@ -54,7 +54,7 @@ COMMANDS: tuple[Command, ...] = (
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code."""
-    arguments = sys.argv[1:] if argv is None else list(argv)
+    arguments = (sys.argv[1:] if argv is None else list(argv)) or ["--help"]
     return guarded(lambda: _app(arguments)(args=arguments, prog_name="siloscope", standalone_mode=False), arguments)
 
 

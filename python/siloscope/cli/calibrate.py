@@ -11,12 +11,13 @@ from rich.console import Console
 
 import siloscope
 from siloscope.cli import options
+from siloscope.cli.inputs import opened
 from siloscope.cli.outcome import PARTIAL, REFUSED, check_place, print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.cli.summary import floor_line, headline, pose_table, silo_line, tilt_line
 from siloscope.errors import UsageError
 from siloscope.io import FrameSource
-from siloscope.reasons import CALIBRATION_REMARKS
+from siloscope.reasons import calibration_remark
 from siloscope.types.calibration import Calibration
 from siloscope.vessel.vessel import load as load_vessel
 
@@ -47,6 +48,9 @@ def calibrate(
         int | None, typer.Option(min=1, max=256, help="Frames at the same time; all cores unless given.")
     ] = None,
     stream: options.Stream = None,
+    trust: options.Trust = None,
+    axes: options.Axes = None,
+    up: options.Up = None,
     as_json: options.AsJson = False,
 ) -> int:
     """Fuse many frames of one silo to its calibration: the camera's pose and the silo's geometry.
@@ -65,9 +69,9 @@ def calibrate(
     paths = [*(files or []), *([] if earlier is not None and not files else empty or [])]
     if not paths and not empty:
         raise UsageError("nothing to calibrate from; give FRAMES, or --empty FRAME")
-    reading: dict[str, Any] = {"camera": camera, "depth_unit": depth_unit, "stream": stream}
+    reading: dict[str, Any] = {"camera": camera, "depth_unit": depth_unit, "stream": stream, "axes": axes, "up": up}
     if paths:
-        with siloscope.open(paths, **reading) as source:
+        with opened(paths, **reading) as source:
             found = siloscope.calibrate(
                 source,
                 sensor=sensor,
@@ -77,6 +81,7 @@ def calibrate(
                 continue_from=earlier,
                 rule=rule,
                 jobs=jobs or os.cpu_count() or 1,
+                trust=trust or (),
                 progress=lambda frames: track(frames, "locating", _count(source)),
             )
     else:
@@ -108,11 +113,11 @@ def _with_floor(
     if not found.ok:
         return found
     if empty:
-        with siloscope.open(empty, **reading) as source:
+        with opened(empty, **reading) as source:
             return siloscope.tare(found, source, **settings)
     if not discharge:
         return found
-    with siloscope.open(discharge, **reading) as source:
+    with opened(discharge, **reading) as source:
         learned = siloscope.learn_floor(found, track(source, "learning the floor", _count(source)), **settings)
     if learned is found:
         say("no floor was learned: no place was seen before and after a fill that covered it")
@@ -145,7 +150,7 @@ def _print(found: Calibration, out: Path) -> None:
         console.print(line, markup=False)
     console.print(floor_line(found.floor), markup=False)
     for code in found.quality:
-        say(f"{code}: {CALIBRATION_REMARKS[code]}{_when(found) if code == 'camera-moved' else ''}")
+        say(f"{code}: {calibration_remark(code)['message']}{_when(found) if code == 'camera-moved' else ''}")
 
 
 def _tell_left_out(found: Calibration) -> None:

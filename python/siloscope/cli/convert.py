@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
-import siloscope
 from siloscope.cli import options
+from siloscope.cli.inputs import opened
 from siloscope.cli.outcome import PARTIAL, print_json, writing
 from siloscope.cli.progress import say, track
 from siloscope.io import FrameSource
@@ -45,7 +45,7 @@ def convert(
     Exit code 5 tells that some frames could not be read.
     """
     given = {"camera": camera, "depth_unit": depth_unit, "stream": stream, "ray_length": ray_length}
-    with siloscope.open(files, **given) as source:  # type: ignore[arg-type]
+    with opened(files, **given) as source:
         with writing(out):
             sink = open_sink(out, raw_unit)
         document = _document(source, sink, out)

@@ -10,15 +10,20 @@ import typer
 
 import siloscope
 from siloscope.cli import options
+from siloscope.cli.inputs import expanded, standard_input
 from siloscope.cli.outcome import PARTIAL, print_json
 from siloscope.cli.progress import track
 from siloscope.io.first_frame import look
 from siloscope.io.recordings.contents import NothingToRead
 from siloscope.io.source import FrameSource
+from siloscope.schema import documents
 
 
 def info(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="Recording, image, array, cloud, or folder of them.")],
+    files: Annotated[
+        list[Path],
+        typer.Argument(metavar="FILE…", help="Recordings, images, arrays, clouds, folders, globs; - for stdin."),
+    ],
     camera: options.CameraFile = None,
     depth_unit: options.DepthUnit = None,
     stream: options.Stream = None,
@@ -29,16 +34,26 @@ def info(
 
     [bold]Example:[/bold] siloscope info recording.bag
 
-    With --check, exit code 5 tells that some frames are damaged.
+    Of several files, --json prints a line each. With --check, exit code 5 tells that some frames are damaged.
     """
-    with _opened(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
+    damaged = False
+    with standard_input(expanded(files)) as paths:
+        for path in paths:
+            document = _document(path, check, camera=camera, depth_unit=depth_unit, stream=stream)
+            damaged |= check and bool(document["problems"])
+            if as_json and len(paths) > 1:
+                print(documents.text(document), flush=True)
+            elif as_json:
+                print_json(document)
+            else:
+                print_description(document)
+    return PARTIAL if damaged else 0
+
+
+def _document(path: Path, check: bool, **terms: Any) -> dict[str, Any]:
+    with _opened(path, **terms) as source:
         read = sum(1 for _ in track(source, "reading")) if check else None
-        document = _described(source) | ({"read": read} if check else {})
-    if as_json:
-        print_json(document)
-    else:
-        print_description(document)
-    return PARTIAL if check and document["problems"] else 0
+        return _described(source) | ({"read": read} if check else {})
 
 
 def _opened(file: Path, **options: Any) -> FrameSource:

@@ -1,7 +1,9 @@
-"""``siloscope locate``: one frame in, the pose out."""
+"""``siloscope locate``: frames in, the camera's pose out."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -10,24 +12,32 @@ import typer
 
 import siloscope
 from siloscope.cli import options
+from siloscope.cli.inputs import Frames, is_many, opened
 from siloscope.cli.outcome import REFUSED, print_json, writing
 from siloscope.cli.progress import say
+from siloscope.cli.several import Answers, each
 from siloscope.cli.summary import print_estimate
 from siloscope.errors import InputError
 from siloscope.estimation import region
 from siloscope.estimation.inputs import metres
 from siloscope.estimation.region import Mask
+from siloscope.io import FrameSource
+from siloscope.io.orientation import optical
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
-from siloscope.wording import counted
+from siloscope.wording import counted, with_std
+
+COLUMNS = ("r_x (°)", "r_y (°)", "t_x (mm)", "t_y (mm)", "radius (mm)", "")
+"""Columns of the table for many frames, after the frame's name."""
 
 
 def locate(
-    file: Annotated[Path, typer.Argument(metavar="FRAME", help="Depth image, depth array, point cloud or recording.")],
+    files: Frames,
     camera: options.CameraFile = None,
     sensor: options.Sensor = None,
     depth_unit: options.DepthUnit = None,
     diameter: options.Diameter = None,
+    vessel: options.VesselFile = None,
     method: Annotated[str | None, typer.Option(help="surface (default) or shape-tensor, the paper's.")] = None,
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the adjusted cloud, the JSON and pictures here.")
@@ -45,38 +55,80 @@ def locate(
     ] = None,
     gravity: options.Gravity = None,
     intrinsics: options.Intrinsics = None,
-    number: Annotated[int, typer.Option("--frame", min=0, help="Which frame of several, from 0.")] = 0,
+    trust: options.Trust = None,
+    axes: options.Axes = None,
+    up: options.Up = None,
+    number: Annotated[int | None, typer.Option("--frame", min=0, help="Which frame of several, from 0.")] = None,
+    every: Annotated[bool, typer.Option("--all", help="Every frame of a recording, not its first.")] = False,
     stream: options.Stream = None,
     threads: options.Threads = None,
     as_json: options.AsJson = False,
 ) -> int:
-    """Find the silo's axis in one frame, and so the camera's pose in the silo.
+    """Find the silo's axis in each frame, and so the camera's pose in the silo.
 
     [bold]Example:[/bold] siloscope locate frame.png --camera camera.json --sensor orbbec-astra-s --out result
 
-    Exit code 4 tells that the frame was read well but does not show enough wall; the answer then says why.
+    Several files and folders give a table, or with --json a line each; of a recording its first frame counts, or the
+    one of --frame, or --all.
+
+    Exit code 4 tells that no frame shows enough wall; the answers then say why. 5: some have none.
     """
-    with siloscope.open(file, camera=camera, depth_unit=depth_unit, stream=stream) as source:
-        frame = options.one_frame(source, number)
-        several = source.frame_count != 1
-    if several and not as_json:
-        say(f"{frame.source}; choose another with --frame")
     box = None if crop is None else options.numbers(crop, 6, "--crop")
-    chosen = selection(frame, mask, label)
     settings: dict[str, Any] = {"method": method, "sensor": sensor, "diameter": diameter, "threads": threads}
-    settings |= {"grid": grid, "neighbours": neighbours, "intrinsics": intrinsics}
+    settings |= {"grid": grid, "neighbours": neighbours, "intrinsics": intrinsics, "trust": trust, "vessel": vessel}
     settings["gravity"] = None if gravity is None else options.numbers(gravity, 3, "--gravity")
     given = {name: value for name, value in settings.items() if value is not None}
-    estimate = siloscope.locate(frame, mask=chosen, crop=box, **given)
-    if estimate.reason == "no-depth" and frame.depth is not None and not (metres(frame) > 0).any():
-        raise InputError(f"{frame.source}: no pixel has a depth; check the stream and the sensor's window")
+
+    def one(frame: Frame) -> tuple[Frame, Estimate, Mask | None]:
+        frame = optical(frame)
+        chosen = selection(frame, mask, label)
+        return frame, _located(frame, mask=chosen, crop=box, **given), within(frame, chosen, box)
+
+    with opened(files, camera=camera, depth_unit=depth_unit, stream=stream, axes=axes, up=up) as source:
+        if number is None and (every or is_many(files, source)):
+            return _each(source, one, out, as_json)
+        frame, estimate, shown = one(options.one_frame(source, number or 0))
+        if source.frame_count != 1 and not as_json:
+            say(f"{frame.source}; choose another with --frame, or --all")
     if out is not None:
-        _write(out, frame, estimate, within(frame, chosen, box))
+        _write(out, frame, estimate, shown)
     if as_json:
         print_json(estimate.to_dict())
     else:
         print_estimate(estimate, frame.source)
     return 0 if estimate.ok else REFUSED
+
+
+def _located(frame: Frame, **settings: Any) -> Estimate:
+    estimate = siloscope.locate(frame, **settings)
+    if estimate.reason == "no-depth" and frame.depth is not None and not (metres(frame) > 0).any():
+        raise InputError(f"{frame.source}: no pixel has a depth; check the stream and the sensor's window")
+    return estimate
+
+
+One = Callable[[Frame], tuple[Frame, Estimate, Mask | None]]
+
+
+def _each(source: FrameSource, one: One, out: Path | None, as_json: bool) -> int:
+    """The answer of every frame, with --out in a folder each."""
+    answers = Answers(COLUMNS, as_json)
+    for number, (frame, (_, estimate, shown)) in enumerate(each(source, one, "locating")):
+        answers.add(frame, estimate, row(estimate))
+        if out is not None:
+            _write(out / f"{number:04d}", frame, estimate, shown)
+    return answers.finish(source.problems)
+
+
+def row(estimate: Estimate) -> tuple[str, ...]:
+    """An estimate's row in the table for many frames; a refused one has its reason."""
+    remarks = ", ".join(remark.code for remark in estimate.quality)
+    if estimate.pose is None or estimate.covariance is None:
+        return "", "", "", "", "", f"refused: {estimate.reason}"
+    std = [math.sqrt(variance) for variance in np.diag(estimate.covariance)]
+    factors = (math.degrees(1.0), math.degrees(1.0), 1e3, 1e3)
+    values = (estimate.r_x, estimate.r_y, estimate.t_x, estimate.t_y)
+    pose = [with_std(v, s, f, "") for v, s, f in zip(values, std, factors, strict=True)]
+    return *pose, with_std(estimate.silo.radius, estimate.silo_std.radius, 1e3, ""), remarks
 
 
 def selection(frame: Frame, mask: Path | None, label: int | None) -> Mask | None:

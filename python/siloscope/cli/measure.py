@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -13,12 +14,15 @@ from rich.table import Table
 
 import siloscope
 from siloscope.cli import options
+from siloscope.cli.inputs import Frames, is_many, opened
 from siloscope.cli.outcome import REFUSED, print_json, writing
 from siloscope.cli.progress import say
+from siloscope.cli.several import Answers, each
 from siloscope.cli.summary import headline
 from siloscope.content import Content
 from siloscope.content.units import SI, Units
 from siloscope.content.units import unit as units_of
+from siloscope.io import FrameSource
 from siloscope.types.frame import Frame
 from siloscope.wording import counted, with_std
 
@@ -57,19 +61,19 @@ Unit = Annotated[
 
 SETTINGS = (
     *("sensor", "vessel", "diameter", "cylinder", "cone", "bottom", "top", "outlet_diameter", "outlet_length"),
-    *("strapping", "density", "density_std", "product", "test_weight", "moisture"),
+    *("strapping", "density", "density_std", "product", "test_weight", "moisture", "trust"),
 )
 """Options that the library takes under the same names."""
 
 
 def chosen(given: dict[str, Any]) -> dict[str, Any]:
     """What a command was given for `siloscope.measure`."""
-    settings = {name: given[name] for name in SETTINGS}
+    settings = {name: given[name] for name in SETTINGS} | {"trust": given["trust"] or ()}
     return settings | {"moisture": None if given["moisture"] is None else given["moisture"] / 100.0}
 
 
 def measure(
-    file: Annotated[Path, typer.Argument(metavar="FRAME", help="Depth image, depth array, point cloud or recording.")],
+    files: Frames,
     calibration: CalibrationFile = None,
     camera: options.CameraFile = None,
     sensor: options.Sensor = None,
@@ -99,8 +103,12 @@ def measure(
         Path | None, typer.Option(metavar="FRAME", help="The frame before, to see whether the content moves.")
     ] = None,
     mask: Annotated[Path | None, typer.Option(help="Image or .npy, not 0 where the silo is.")] = None,
-    number: Annotated[int, typer.Option("--frame", min=0, help="Which frame of several, from 0.")] = 0,
+    number: Annotated[int | None, typer.Option("--frame", min=0, help="Which frame of several, from 0.")] = None,
+    every: Annotated[bool, typer.Option("--all", help="Every frame of a recording, not its first.")] = False,
     stream: options.Stream = None,
+    trust: options.Trust = None,
+    axes: options.Axes = None,
+    up: options.Up = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write the JSON, the map and pictures here.")] = None,
     as_json: options.AsJson = False,
 ) -> int:
@@ -108,26 +116,54 @@ def measure(
 
     [bold]Example:[/bold] siloscope measure frame.png --calibration silo7.json --product wheat --out reading
 
-    Without --calibration the frame itself must show enough wall. Exit code 4: the frame was read well, but gives no
-    trustworthy answer; the JSON says why.
+    Without --calibration the frame itself must show enough wall. Several files and folders give a table, or with --json
+    a line each; of a recording its first frame counts, or the one of --frame, or --all; `track` tells their story.
+    Exit code 4: the frame was read well, but gives no trustworthy answer; the JSON says why. 5: some of several do.
     """
     settings, units = chosen(locals()), units_of(unit)
-    place = {"camera": camera, "depth_unit": depth_unit, "stream": stream}
-    frame = _frame(file, number, place)
+    place = {"camera": camera, "depth_unit": depth_unit, "stream": stream, "axes": axes, "up": up}
     silo = None if calibration is None else siloscope.Calibration.load(calibration)
-    before = None if previous is None else siloscope.measure(_frame(previous, 0, place), silo, **settings)
     if pose is not None:
         settings["pose"] = siloscope.SiloPose(*options.numbers(pose, 4, "--pose"))
     if pose_std is not None:
         settings["pose_std"] = tuple(options.numbers(pose_std, 2, "--pose-std"))
-    inside = None if mask is None else _mask(mask, frame)
-    content = siloscope.measure(frame, silo, mask=inside, previous=before, **settings)
+    before = None
+    if previous is not None:
+        with opened([previous], **place) as source:
+            before = siloscope.measure(source[0], silo, **settings)
+
+    def one(frame: Frame) -> Content:
+        inside = None if mask is None else _mask(mask, frame)
+        return siloscope.measure(frame, silo, mask=inside, previous=before, **settings)
+
+    with opened(files, **place) as source:
+        if number is None and (every or is_many(files, source)):
+            return _each(source, one, out, (as_json, units))
+        content = one(options.one_frame(source, number or 0))
     return _answer(content, out, as_json, units)
 
 
-def _frame(file: Path, number: int, place: dict[str, Any]) -> Frame:
-    with siloscope.open(file, **place) as source:
-        return options.one_frame(source, number)
+def _each(source: FrameSource, one: Callable[[Frame], Content], out: Path | None, shown: tuple[bool, Units]) -> int:
+    """The answer of every frame, with --out in a folder each."""
+    as_json, units = shown
+    columns = tuple(f"{name} ({sign})" for name, (_, sign) in zip(("volume", "mass"), units, strict=True))
+    answers = Answers((*columns, "level (m)", ""), as_json)
+    for number, (frame, content) in enumerate(each(source, one, "measuring")):
+        answers.add(frame, content, _short_row(content, units))
+        if out is not None:
+            _write(out / f"{number:04d}", content)
+    return answers.finish(source.problems)
+
+
+def _short_row(content: Content, units: Units) -> tuple[str, ...]:
+    """A content's row in the table for many frames; a refused one has its reason."""
+    if not content.ok:
+        return "", "", "", f"refused: {content.reason}"
+    (m3, _), (kilograms, _) = units
+    volume = "" if content.volume is None else with_std(content.volume, content.volume_std, 1.0 / m3, "")
+    mass = "" if content.mass is None else with_std(content.mass, content.mass_std, 1.0 / kilograms, "")
+    remarks = ", ".join(remark.code for remark in content.quality)
+    return volume, mass, with_std(content.level.mean, content.level.std, 1.0, ""), remarks
 
 
 def _mask(mask: Path, frame: Frame) -> Any:
@@ -139,16 +175,20 @@ def _mask(mask: Path, frame: Frame) -> Any:
 
 def _answer(content: Content, out: Path | None, as_json: bool, units: Units) -> int:
     if out is not None:
-        from siloscope.reporting.content_files import write_content
-
-        with writing(out):
-            written = write_content(out, content)
-        say(f"wrote {counted(len(written), 'file')} to {out}")
+        _write(out, content)
     if as_json:
         print_json(content.to_dict())
     else:
         print_content(content, units)
     return 0 if content.ok else REFUSED
+
+
+def _write(out: Path, content: Content) -> None:
+    from siloscope.reporting.content_files import write_content
+
+    with writing(out):
+        written = write_content(out, content)
+    say(f"wrote {counted(len(written), 'file')} to {out}")
 
 
 def print_content(content: Content, units: Units = SI) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +32,17 @@ Intrinsics = Annotated[
     str | None,
     typer.Option("--intrinsics", metavar="exact|calibrated|nominal", help="How exactly the intrinsics are known."),
 ]
+Trust = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--trust", metavar="WHAT", help="Keep an answer against: range, camera, bias, diameter or gravity; repeatable."
+    ),
+]
+Axes = Annotated[
+    str | None,
+    typer.Option("--axes", metavar="X,Y,Z", help="A cloud's axes that are right, down, forward, such as x,-y,-z."),
+]
+Up = Annotated[str | None, typer.Option("--up", metavar="AXIS", help="A cloud's axis that points upwards: z, -y, ….")]
 Bottom = Annotated[
     str | None, typer.Option("--bottom", metavar="KIND", help="cone: the cone seen is the bottom; flat; unknown.")
 ]
@@ -51,6 +63,18 @@ def numbers(text: str, count: int, option: str) -> tuple[float, ...]:
     if len(values) != count or not all(math.isfinite(value) for value in values):
         raise UsageError(f"{option} '{text}': give {count} numbers separated by commas")
     return values
+
+
+SECONDS = {"": 1.0, "s": 1.0, "min": 60.0, "h": 3600.0, "d": 86_400.0, "w": 604_800.0}
+"""Seconds of the units in which a duration may be written."""
+
+
+def seconds(text: str, option: str) -> float:
+    """A duration of an option in seconds: a number, or one with a unit of `SECONDS`."""
+    found = re.fullmatch(r"\s*(\d+(?:\.\d*)?(?:e[+-]?\d+)?)\s*([a-z]*)\s*", text.lower())
+    if found is None or found[2] not in SECONDS:
+        raise UsageError(f"{option} '{text}': give seconds, or a number with {', '.join(filter(None, SECONDS))}: 1h")
+    return float(found[1]) * SECONDS[found[2]]
 
 
 def one_frame(source: FrameSource, number: int) -> Frame:

@@ -14,7 +14,7 @@ from typing import Any
 
 import typer
 
-from siloscope.errors import SiloscopeError, UsageError
+from siloscope.errors import SiloscopeError, UsageError, naming_options
 
 REFUSED = 4
 """Read well, but the frame does not show enough wall."""
@@ -29,7 +29,7 @@ def guarded(run: Callable[[], Any], arguments: Sequence[str]) -> int:
     _make_streams_safe()
     as_json = "--json" in arguments
     try:
-        with _plain_warnings():
+        with _plain_warnings(), naming_options():
             code = run() or 0
             if code == INTERRUPTED:  # typer has caught the interruption and says no more than its code
                 raise KeyboardInterrupt
@@ -44,7 +44,8 @@ def guarded(run: Callable[[], Any], arguments: Sequence[str]) -> int:
         _forget_where_it_was()
         return _report("interrupted", "interrupted", INTERRUPTED, as_json)
     except SiloscopeError as error:
-        return _report(_kind(error), str(error), error.exit_code, as_json)
+        with naming_options():
+            return _report(_kind(error), str(error), error.exit_code, as_json)
     except typer.TyperException as error:
         return _report("usage", _usage_sentence(error), 2, as_json)
     except MemoryError:

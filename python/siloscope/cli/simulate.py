@@ -4,6 +4,10 @@ from __future__ import annotations
 
 import json
 import math
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -186,18 +190,36 @@ def _write(
 ) -> dict[str, Any]:
     _check_empty(out)
     frames = []
-    for index, scene in enumerate(track(scenes, "simulating")):
-        frame = scene.render(threads)  # a scene that can't be is refused before anything is written
-        with writing(out):
-            (out / "labels" if labels else out).mkdir(parents=True, exist_ok=True)
-            entry = _write_frame(frame, out, f"frame_{index:04d}", unit, labels)
+    with _whole(out) as folder:
+        for index, scene in enumerate(track(scenes, "simulating")):
+            frame = scene.render(threads)
+            with writing(out):
+                (folder / "labels" if labels else folder).mkdir(exist_ok=True)
+                entry = _write_frame(frame, folder, f"frame_{index:04d}", unit, labels)
             free = {} if vessel is None else {"ullage_m3": ullage(vessel, scene.silo, frame.true_volume)}
             frames.append({**entry, **free})
-    document = _document(scenes[0], unit, frames)
-    with writing(out):
-        camera_files.dump(scenes[0].told or scenes[0].camera, out / "camera.json", unit)
-        (out / "truth.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+        document = _document(scenes[0], unit, frames)
+        with writing(out):
+            camera_files.dump(scenes[0].told or scenes[0].camera, folder / "camera.json", unit)
+            (folder / "truth.json").write_text(json.dumps(document, indent=2, allow_nan=False) + "\n", "utf-8")
     return document
+
+
+@contextmanager
+def _whole(out: Path) -> Iterator[Path]:
+    """A folder beside `out` whose files go there once all are written; interrupted, none does."""
+    with writing(out):
+        place = out.resolve()
+        folder = place.with_name(f".{place.name}-{os.getpid()}")
+        folder.mkdir(parents=True)
+    try:
+        yield folder
+        with writing(out):
+            place.mkdir(exist_ok=True)
+            for written in sorted(folder.iterdir()):
+                written.rename(place / written.name)
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def _check_empty(out: Path) -> None:

@@ -29,12 +29,21 @@ def print_estimate(estimate: Estimate, source: str) -> None:
     if not estimate.ok:
         console.print(headline(False, f"{source}: {estimate.reason}"))
         console.print(estimate.message or "", markup=False)
+        _print_quality(console, estimate)
         return
     console.print(headline(True, f"{source}: method {estimate.method}"))
     console.print(pose_table(estimate))
     for line in (tilt_line(estimate), silo_line(estimate.silo, estimate.silo_std), ratios_line(estimate.pixel_ratios)):
         if line:
             console.print(line, markup=False)
+    _print_quality(console, estimate)
+
+
+def _print_quality(console: Console, estimate: Estimate) -> None:
+    """The remarks, but for the one that the refusal's message has."""
+    for remark in estimate.quality:
+        if remark.code != estimate.reason:
+            console.print(f"{remark.severity}: {remark.text}; {remark.advice}", markup=False)
 
 
 def headline(ok: bool, rest: str) -> Text:

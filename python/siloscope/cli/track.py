@@ -16,6 +16,7 @@ from rich.table import Table
 import siloscope
 from siloscope.cli import measure as one
 from siloscope.cli import options
+from siloscope.cli.inputs import opened
 from siloscope.cli.outcome import PARTIAL, REFUSED, print_json, writing
 from siloscope.cli.progress import say
 from siloscope.cli.progress import track as bar
@@ -53,7 +54,7 @@ def track(
     test_weight: one.TestWeight = None,
     moisture: one.Moisture = None,
     interval: Annotated[
-        float | None, typer.Option(metavar="S", help="Seconds between frames that have no time of their own.")
+        str | None, typer.Option(metavar="TIME", help="Between frames that have no time: seconds, or 15min, 1h, 1d.")
     ] = None,
     start: Annotated[
         str | None, typer.Option(metavar="TIME", help="Time of the first of them, such as 2026-03-01T06:00Z.")
@@ -67,6 +68,9 @@ def track(
         int | None, typer.Option(min=1, max=256, help="Frames at the same time; all cores unless given.")
     ] = None,
     stream: options.Stream = None,
+    trust: options.Trust = None,
+    axes: options.Axes = None,
+    up: options.Up = None,
     out: Annotated[Path | None, typer.Option(metavar="DIR", help="Write tables, trend and report here.")] = None,
     parquet: Annotated[bool, typer.Option("--parquet", help="Write a Parquet table too (needs pyarrow).")] = False,
     lines: Annotated[bool, typer.Option("--jsonl", help="Print one JSON line a reading on stdout.")] = False,
@@ -83,11 +87,11 @@ def track(
     if parquet and out is None:
         raise UsageError("--parquet writes a file; give --out DIR")
     silo = siloscope.Calibration.load(calibration)
-    with siloscope.open(files, camera=camera, depth_unit=depth_unit, stream=stream) as source:
+    with opened(files, camera=camera, depth_unit=depth_unit, stream=stream, axes=axes, up=up) as source:
         found = siloscope.track(
             source,
             silo,
-            interval=interval,
+            interval=None if interval is None else options.seconds(interval, "--interval"),
             start=_time(start),
             continue_from=earlier,
             jobs=jobs or os.cpu_count() or 1,

@@ -161,13 +161,33 @@ def products() -> dict[str, Density]:
     return {name: _density(product.parse(entry, name), name) for name, entry in table.items()}
 
 
+ALIASES = {
+    "corn": "maize",
+    "soya": "soybeans",
+    "soy": "soybeans",
+    "soybean": "soybeans",
+    "soya-meal": "soybean-meal",
+    "soy-meal": "soybean-meal",
+    "ground-corn": "ground-maize",
+    "milo": "sorghum",
+    "rapeseed": "canola",
+    "linseed": "flax",
+    "bran": "wheat-bran",
+    "paddy": "rice",
+    "pellet": "pellets",
+}
+"""Other names of the products."""
+
+
 def load(name: str) -> Density:
-    """A product by name, or from a TOML file with ``density`` and what else `Density` has."""
+    """A product by name or alias, or from a TOML file with ``density`` and what else `Density` has."""
     from siloscope.schema import product
 
     known = products()
-    if name in known:
-        return known[name]
+    plain = name.lower().replace("_", "-").replace(" ", "-")
+    plain = ALIASES.get(plain, plain)
+    if plain in known:
+        return known[plain]
     path = Path(name)
     if not path.is_file():
         raise UsageError(f"unknown product '{name}'; give a TOML file's path or one of: {', '.join(sorted(known))}")

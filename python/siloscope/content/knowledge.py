@@ -15,10 +15,10 @@ from siloscope.errors import InputError, UsageError
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
 from siloscope.types.camera import Camera
-from siloscope.types.content import Remark
 from siloscope.types.floor import Floor
 from siloscope.types.frame import Frame
 from siloscope.types.pose import SiloPose
+from siloscope.types.remark import Remark
 from siloscope.types.vessel import Lengths, SiloGeometry
 from siloscope.vessel.datasheet import Datasheet
 from siloscope.vessel.floor import CONTRADICTION_STD, STEEPEST_REPOSE, floor_of

@@ -19,9 +19,10 @@ from siloscope.estimation.inputs import Prepared
 from siloscope.reasons import CONTENT_REMARKS, sentence
 from siloscope.sensors import UNKNOWN, SensorProfile
 from siloscope.types.calibration import Calibration
-from siloscope.types.content import Content, Level, Parts, Remark
+from siloscope.types.content import Content, Level, Parts
 from siloscope.types.floor import Floor
 from siloscope.types.pose import SiloPose
+from siloscope.types.remark import Remark
 from siloscope.types.surface_map import SurfaceMap
 from siloscope.vessel.limits import LENGTH_STD
 from siloscope.vessel.vessel import Vessel

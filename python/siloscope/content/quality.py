@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from siloscope.content.measured import Measured
-from siloscope.types.content import Remark
+from siloscope.types.remark import Remark
 
 LEAST_COVERAGE = 0.05
 """Share of the surface that must be seen."""

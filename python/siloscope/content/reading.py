@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from siloscope import _core
 from siloscope.content import quality
+from siloscope.content.alone import meaning, spoken_alone
 from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density
 from siloscope.content.fitting import lengths_for_core
@@ -19,11 +20,10 @@ from siloscope.content.measured import Measured
 from siloscope.content.over_floor import OverFloor, volume_over
 from siloscope.content.setup import CoreVessel
 from siloscope.content.ullage import Ullage, ullage_of
-from siloscope.reasons import CONTENT_REMARKS, sentence
-from siloscope.types.calibration import Calibration
-from siloscope.types.content import Content, Level, Remark, with_movement
-from siloscope.types.estimate import Estimate
+from siloscope.reasons import sentence
+from siloscope.types.content import Content, Level, with_movement
 from siloscope.types.frame import Frame
+from siloscope.types.remark import Remark
 from siloscope.types.surface_map import Shape, SurfaceMap
 from siloscope.vessel.datasheet import Datasheet
 from siloscope.vessel.floor import settles
@@ -49,6 +49,8 @@ class Request:
     density: Density | None
     previous: Content | None
     located: bool
+    said: tuple[Remark, ...] = ()
+    """What the inputs say against each other."""
 
 
 def content_of(
@@ -67,7 +69,8 @@ def content_of(
     found = _with_hidden(_with_total(Measured.of(core), over, free if lacking else None), known)
     free = free if over is None else over.free
     coverage = _coverage(core)
-    said = (*known.remarks, *quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
+    said = (*request.said, *known.remarks, *quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
+    said = spoken_alone(said) if request.located else said
     frame: dict[str, Any] = {
         "source": source_of(request.data),
         "timestamp": request.data.timestamp if isinstance(request.data, Frame) else None,
@@ -222,7 +225,7 @@ def refused(code: str, seen: str, data: Frame | ArrayLike, known: Knowledge) -> 
 
 
 def _refused(remark: Remark, frame: dict[str, Any]) -> Content:
-    message = sentence(CONTENT_REMARKS[remark.code], f" ({remark.seen})")
+    message = sentence(meaning(remark.code), f" ({remark.seen})")
     others = tuple(other for other in frame.get("quality", ()) if not other.refuses or other.code == remark.code)
     frame = {**frame, "quality": others if remark in others else (*others, remark)}
     return Content("refused", remark.code, message, **frame)
@@ -314,10 +317,10 @@ def _config(request: Request) -> dict[str, Any]:
     }
 
 
-def unlocated(data: Frame | ArrayLike, estimate: Estimate | Calibration) -> Content:
-    """The answer where no calibration is given and the frame does not show the silo's axis."""
-    message = f"{estimate.message} A calibration (--calibration) would do without."
-    return Content("refused", estimate.reason, message, source=source_of(data), config=estimate.config)
+def contradicted(data: Frame | ArrayLike, against: Remark, said: tuple[Remark, ...]) -> Content:
+    """The answer where the frame contradicts what is known of its sensor."""
+    message = sentence((against.text, against.advice))
+    return Content("refused", against.code, message, source=source_of(data), quality=said)
 
 
 def source_of(data: Frame | ArrayLike) -> str:

@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from siloscope import _core
 from siloscope.errors import InputError, UsageError
+from siloscope.estimation.pixel_lattice import image_of
+from siloscope.estimation.virtual_image import image_from_origin
+from siloscope.io.orientation import Turn, optical, turn_of
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
@@ -21,6 +24,9 @@ LONGEST = 1000.0
 
 FARTHEST_CLOUD = 10_000.0
 """Distance of a cloud from the origin, m, from which on the origin can't be its sensor."""
+
+PIXELS, RESAMPLED = "the image that its rays are of", "resampled as seen from the origin"
+"""How a cloud became a depth image."""
 
 SENTINEL = 65535
 """Raw 16-bit depth that means "no measurement"."""
@@ -34,15 +40,19 @@ class PreparedDepth:
     camera: Camera
     gravity: NDArray[np.float64] | None
     config: dict[str, Any]
+    turn: Turn | None = None
+    """How the cloud was turned that it was made of; None for images."""
 
 
 @dataclass(frozen=True, eq=False)
 class PreparedPoints:
-    """A cloud as the methods take it: `points` float64 (N, 3), metres, finite rows only."""
+    """A cloud as the methods take it: `points` float64 (N, 3) in the optical frame, metres, finite rows only."""
 
     points: NDArray[np.float64]
     gravity: NDArray[np.float64] | None
     config: dict[str, Any]
+    turn: Turn | None = None
+    """How it was turned."""
 
 
 Prepared = PreparedDepth | PreparedPoints
@@ -57,8 +67,13 @@ def prepare(
     depth_unit: float | None = None,
     mask: ArrayLike | None = None,
     crop: Sequence[float] | None = None,
+    clouds: str = "points",
 ) -> Prepared:
     """Check a frame and bring it into one form.
+
+    A cloud is turned to the optical frame. `clouds` says what becomes of it then: "points" leave it one, and "as is"
+    does so in its own frame; "pixels" make the depth image of it that it was, where its rays are a pinhole camera's;
+    "resampled" make one of any cloud that was seen from its origin.
 
     Raises
     ------
@@ -75,16 +90,34 @@ def prepare(
     config: dict[str, Any] = {"crop": None if crop is None else list(crop), "masked": mask is not None}
     box = None if crop is None else crop_box(crop)
     if frame.points is not None:
-        points = _points(frame.points, frame.source)
-        kept = _mask(mask, frame.points.shape[:-1], frame.source)
-        if kept is not None:
-            points = points[kept.reshape(-1)]
-        points = points[np.isfinite(points).all(axis=1)]
-        points = points if box is None else points[within(points, box)]
-        _not_empty(len(points), frame.source)
-        _near_the_sensor(points, frame.source)
-        return PreparedPoints(np.ascontiguousarray(points), frame.gravity, config)
+        turned = frame if clouds == "as is" else optical(frame)
+        return _prepare_points(turned, mask, box, config, clouds)
     return _prepare_depth(frame, profile, mask, box, config)
+
+
+def _prepare_points(
+    frame: Frame,
+    mask: ArrayLike | None,
+    box: NDArray[np.float64] | None,
+    config: dict[str, Any],
+    clouds: str,
+) -> Prepared:
+    turn = turn_of(frame)
+    config = config | {"axes": None if turn is None else str(turn)}
+    points = _points(frame.points, frame.source)
+    kept = _mask(mask, np.asarray(frame.points).shape[:-1], frame.source)
+    if kept is not None:
+        points = points[kept.reshape(-1)]
+    points = points[np.isfinite(points).all(axis=1)]
+    points = points if box is None else points[within(points, box)]
+    _not_empty(len(points), frame.source)
+    _near_the_sensor(points, frame.source)
+    found, how = (image_of(points) if clouds in ("pixels", "resampled") else None), PIXELS
+    if found is None and clouds == "resampled":
+        found, how = image_from_origin(points), RESAMPLED
+    if found is None:
+        return PreparedPoints(np.ascontiguousarray(points), frame.gravity, config, turn)
+    return PreparedDepth(*found, frame.gravity, config | {"cloud": how}, turn)
 
 
 def _prepare_depth(
@@ -206,7 +239,7 @@ def _nominal_camera(depth: NDArray[Any], profile: SensorProfile, source: str) ->
     return camera
 
 
-def _points(points: NDArray[Any], source: str) -> NDArray[np.float64]:
+def _points(points: NDArray[Any] | None, source: str) -> NDArray[np.float64]:
     array = np.asarray(points)
     _numeric(array, source)
     if array.ndim not in (2, 3) or array.shape[-1] != 3:

@@ -6,23 +6,49 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from siloscope.estimation import shape_tensor, surface
 from siloscope.estimation.inputs import Prepared, PreparedPoints
 from siloscope.estimation.priors import CLOUD, Priors
 from siloscope.estimation.settings import Settings
-from siloscope.types.estimate import Estimate
+from siloscope.sensors import SensorProfile
+from siloscope.types.estimate import Estimate, SurfaceDetails
+
+
+def priors_of(frame: Prepared, settings: Settings) -> Priors:
+    """What is known before the frame."""
+    if isinstance(frame, PreparedPoints):
+        return Priors(CLOUD, settings.diameter, settings.gravity)
+    priors = Priors(settings.profile, settings.diameter, settings.gravity)
+    if settings.vessels != "any":
+        return priors
+    return replace(priors, any_vessel=True, camera_std=settings.intrinsics_std(frame).of_rays(frame.camera))
 
 
 def _surface(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:
-    profile = CLOUD if isinstance(frame, PreparedPoints) else settings.profile
-    priors = Priors(profile, settings.diameter, settings.gravity)
+    priors = priors_of(frame, settings)
     if isinstance(frame, PreparedPoints):
-        return surface.fit_points(frame.points, priors, grid=settings.grid, threads=settings.threads, config=config)
-    if settings.vessels == "any":
-        camera_std = settings.intrinsics_std(frame).of_rays(frame.camera)
-        priors = replace(priors, any_vessel=True, camera_std=camera_std)
+        points = _unbiased(frame.points, settings.profile)
+        return surface.fit_points(points, priors, grid=settings.grid, threads=settings.threads, config=config)
     start, ratios = settings.start, settings.ratios
-    return surface.fit_depth(frame.depth, frame.camera, priors, start=start, ratios=ratios, config=config)
+    estimate = surface.fit_depth(frame.depth, frame.camera, priors, start=start, ratios=ratios, config=config)
+    return estimate if frame.turn is None else _of_a_cloud(estimate)
+
+
+def _unbiased(points: NDArray[np.float64], profile: SensorProfile) -> NDArray[np.float64]:
+    """Points before the sensor, moved along their rays from the origin to the depth it should have measured."""
+    if not any(profile.bias):
+        return points
+    ahead = points[points[:, 2] > 0.0]
+    return np.ascontiguousarray(ahead * (profile.true_depth(ahead[:, 2]) / ahead[:, 2])[:, None])
+
+
+def _of_a_cloud(estimate: Estimate) -> Estimate:
+    """An answer by a cloud's image, without what only an image's pixels have."""
+    found = estimate.details
+    return estimate if found is None else replace(estimate, details=SurfaceDetails(found.points, found.residuals))
 
 
 def _shape_tensor(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -9,13 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from siloscope.errors import UsageError
-from siloscope.estimation.inputs import Prepared, PreparedDepth
+from siloscope.estimation.contradictions import trusted
+from siloscope.estimation.inputs import RESAMPLED, Prepared, PreparedDepth
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import is_number
 from siloscope.types.estimate import Estimate
-from siloscope.types.intrinsics import EXACT, NAMES, IntrinsicsStd, named
+from siloscope.types.intrinsics import CALIBRATED, EXACT, NAMES, IntrinsicsStd, named
 
 Number = float | None
+
+RAY_STD = 0.002
+"""Direction of the rays of a cloud that is no camera's, rad: as a pixel of a calibrated camera."""
 
 VESSELS = ("any", "coaxial")
 """Which vessels may be in view."""
@@ -35,6 +40,10 @@ class Settings:
     ratios: bool
     intrinsics: str | IntrinsicsStd | None
     vessels: str
+    trust: frozenset[str] = frozenset()
+    """Codes of contradictions that only warn."""
+    gravity_is_behind: bool = False
+    """Whether gravity points out of the camera's back, and was turned round."""
 
     @classmethod
     def checked(
@@ -50,12 +59,13 @@ class Settings:
         ratios: bool,
         intrinsics: str | IntrinsicsStd | None,
         vessels: str,
+        trust: str | Sequence[str] = (),
     ) -> Settings:
         """Raises `UsageError` for a setting outside its bounds."""
         return cls(
             profile,
             _bounded("diameter", diameter, 0.01, 200.0),
-            _downwards(gravity),
+            _direction(gravity),
             _bounded("grid", grid, 1e-4, 10.0),
             _whole("neighbours", neighbours, 6, 500),
             _whole("threads", threads, 1, 256),
@@ -63,22 +73,33 @@ class Settings:
             ratios,
             intrinsics if isinstance(intrinsics, IntrinsicsStd | None) else _one_of("intrinsics", intrinsics, NAMES),
             _one_of("vessels", vessels, VESSELS),
+            trusted(trust),
         )
 
     def with_gravity_of(self, prepared: Prepared) -> Settings:
-        """With the frame's own gravity where the caller gives none."""
-        if self.gravity is not None or prepared.gravity is None:
-            return self
-        return replace(self, gravity=_direction(prepared.gravity))
+        """With gravity in the optical frame: the caller's, who gives it in the file's, else the frame's own.
+
+        It is a line's direction to the fit, and made to point forward.
+        """
+        turn = prepared.turn
+        if self.gravity is None:
+            down = None if prepared.gravity is None else _direction(prepared.gravity)
+        else:
+            down = self.gravity if turn is None else turn.rotation @ self.gravity
+        if down is None or down[2] >= 0.0:
+            return replace(self, gravity=down)
+        return replace(self, gravity=-down, gravity_is_behind=True)
 
     def intrinsics_std(self, frame: PreparedDepth) -> IntrinsicsStd:
-        """How exactly the intrinsics of a frame are known."""
+        """How exactly the intrinsics of a frame are known; of a cloud's rays as of a calibrated camera's."""
         if self.vessels == "coaxial":
             return EXACT
         if isinstance(self.intrinsics, IntrinsicsStd):
             return self.intrinsics
         if self.intrinsics is None and frame.camera.intrinsics_std is not None:
             return frame.camera.intrinsics_std
+        if frame.config.get("cloud") == RESAMPLED:
+            return IntrinsicsStd(CALIBRATED.f, RAY_STD * frame.camera.fx, CALIBRATED.k1)
         name = self.intrinsics or ("nominal" if "intrinsics" in frame.config else "calibrated")
         return self.profile.nominal_std(frame.camera) if name == "nominal" else named(name, frame.camera)
 
@@ -117,17 +138,6 @@ def _whole(name: str, value: float, least: int, most: int) -> int:
     if not is_number(value) or not least <= value <= most or value != int(value):
         raise UsageError(f"{name} must be a whole number between {least} and {most}, got {value}")
     return int(value)
-
-
-def _downwards(gravity: ArrayLike | None) -> NDArray[np.float64] | None:
-    """Gravity as a caller gives it, who may mistake an accelerometer's reading for it."""
-    vector = _direction(gravity)
-    if vector is not None and vector[2] < 0.0:
-        raise UsageError(
-            f"gravity {vector.tolist()} points out of the camera's back; an accelerometer at rest reads minus gravity: "
-            "turn all three signs"
-        )
-    return vector
 
 
 def _direction(gravity: ArrayLike | None) -> NDArray[np.float64] | None:

@@ -148,6 +148,7 @@ def _quality(fit: _core.SurfaceFit, cone_slope: float | None) -> dict[str, Any]:
         "arc": wall.arc,
         "turn": wall.turn,
         "bend": wall.bend,
+        "camera_error": fit.camera_error,
     }
 
 

@@ -15,6 +15,7 @@ from pathlib import Path
 from siloscope.errors import InputError, UsageError
 from siloscope.io.camera_sizes import Known
 from siloscope.io.chain import Chain, Unreadable
+from siloscope.io.orientation import checked_axes
 from siloscope.io.registry import unread, without_header
 from siloscope.io.source import HEAD_BYTES, Format, FrameSource, Item, Options
 from siloscope.types.camera import Camera
@@ -67,6 +68,8 @@ def open(
     depth_unit: float | None = None,
     stream: str | None = None,
     ray_length: bool = False,
+    axes: str | None = None,
+    up: str | None = None,
 ) -> FrameSource:
     """Opens a file or folder, or several one after the other, by its content; decodes nothing yet.
 
@@ -82,16 +85,21 @@ def open(
         Which of several depth streams.
     ray_length : bool
         The stored depth is the length of the ray, not z.
+    axes : str, optional
+        Axes of a cloud's file that are right, down and forward for the sensor, such as "x,-y,-z" where z points
+        backwards and y up. Without it they are found by where the points lie.
+    up : str, optional
+        Instead of `axes`, the axis of the file that points upwards: "z", "-y".
 
     Raises
     ------
     InputError
         Where the file is missing, empty, of no known format, or damaged at its head.
     UsageError
-        For a depth unit that can't be one.
+        For a depth unit that can't be one, or axes that are no right-handed frame.
     """
     cameras, camera_unit = _cameras(camera)
-    options = Options(cameras, _unit(depth_unit), camera_unit, stream, ray_length)
+    options = Options(cameras, _unit(depth_unit), camera_unit, stream, ray_length, turn=checked_axes(axes, up))
     if isinstance(path, str | PathLike):
         return _open_one(Path(path), options)
     if not path:

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 from types import TracebackType
-from typing import TYPE_CHECKING, Any, NamedTuple, Self
+from typing import TYPE_CHECKING, Any, NamedTuple, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,8 +192,20 @@ class FrameSource(ABC):
         if not read:
             raise self._nothing_read()
 
-    def __getitem__(self, index: int) -> Frame:
-        """One frame by its number from 0; raises `IndexError` past the end and `InputError` where it is damaged."""
+    @overload
+    def __getitem__(self, index: int) -> Frame: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> list[Frame]: ...
+
+    def __getitem__(self, index: int | slice) -> Frame | list[Frame]:
+        """One frame by its number from 0, or from the end by a negative one; the frames of a slice.
+        Raises `IndexError` past the end and `InputError` where a frame is damaged."""
+        if isinstance(index, slice):
+            return [self._finished(item) for item in list(self._items())[index]]
+        if index < 0:
+            count = self._count()
+            index += sum(1 for _ in self._items()) if count is None else count
         item = next(islice(self._items(), index, None), None) if index >= 0 else None
         if item is None:
             raise IndexError(f"{self.name}: no frame {index}")

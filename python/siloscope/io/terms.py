@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from siloscope.errors import InputError
 from siloscope.io.camera_sizes import Known, choose
+from siloscope.io.orientation import Turn, optical
 from siloscope.types.frame import Frame
 
 FARTHEST_M = 100.0
@@ -41,6 +42,8 @@ class Options:
         Which of several streams, by name or a part of it that fits only one.
     ray_length : bool
         The file's depth is the length of the ray, not z.
+    turn : Turn or None
+        The axes of a cloud's file that are right, down and forward; None leaves them to be found.
     beside : bool
         Whether to take the camera from a file beside the frame, where the format has no place for one.
     """
@@ -51,6 +54,7 @@ class Options:
     stream: str | None = None
     ray_length: bool = False
     beside: bool = True
+    turn: Turn | None = None
 
 
 class UnknownUnit(InputError):
@@ -61,6 +65,8 @@ def finish(frame: Frame, options: Options) -> Frame:
     """The frame with the user's camera, unit and ray length applied and checked; raises `InputError`."""
     frame = _with_unit(frame, options)
     frame = _with_camera(frame, options.cameras)
+    if options.turn is not None:
+        frame = optical(frame, options.turn)
     return _z_from_ray_length(frame) if options.ray_length else frame
 
 

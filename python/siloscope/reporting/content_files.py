@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from pathlib import Path
 
+from siloscope.reporting.renewal import without_older
 from siloscope.schema import documents
 from siloscope.types.content import Content
 from siloscope.types.surface_map import KINDS, SurfaceMap
@@ -13,8 +14,14 @@ COLUMNS = ("x_m", "y_m", "height_m", "std_m", "kind")
 """Columns of the map's file; heights are over the reading's datum."""
 
 
+RESULTS = ("content.json", "surface.csv", "height-map.png", "surface.png", "section.png")
+"""Files that a reading may have."""
+
+
 def write_content(directory: Path, content: Content) -> list[Path]:
     """Writes ``content.json``, ``surface.csv`` and the pictures that the reading allows; returns their paths.
+
+    Files of these names that an earlier reading left are deleted.
 
     Raises `OSError` where the directory can't be written.
     """
@@ -25,7 +32,8 @@ def write_content(directory: Path, content: Content) -> list[Path]:
     written = [documents.write(directory / "content.json", content.to_dict())]
     if content.surface is not None:
         written.append(write_map(directory / "surface.csv", content.surface))
-    return written + [save(made, directory / f"{name}.png") for name, made in pictures(content).items()]
+    written += [save(made, directory / f"{name}.png") for name, made in pictures(content).items()]
+    return without_older(directory, written, RESULTS)
 
 
 def write_map(path: Path, surface: SurfaceMap) -> Path:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from siloscope.errors import SiloscopeError
 from siloscope.estimation.region import depth_metres, frame_points
 from siloscope.io import writers
+from siloscope.reporting.renewal import without_older
 from siloscope.schema import documents
 from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate
@@ -24,8 +25,17 @@ if TYPE_CHECKING:
 Mask = NDArray[np.bool_]
 
 
+PICTURES = ("depth", "overview", "clouds", "candidates", "directions", "profile")
+"""Pictures of an estimate, as far as its frame allows them."""
+
+RESULTS = ("estimate.json", "adjusted.ply", "corrected.ply", *(f"{name}.png" for name in PICTURES))
+"""Files that an estimate may have."""
+
+
 def write_results(directory: Path, frame: Frame, estimate: Estimate, mask: Mask | None = None) -> list[Path]:
     """Writes ``estimate.json``, ``adjusted.ply`` and the pictures that the estimate allows; returns their paths.
+
+    Files of these names that an earlier estimate left are deleted.
 
     Raises `OSError` where the directory can't be written.
     """
@@ -35,7 +45,8 @@ def write_results(directory: Path, frame: Frame, estimate: Estimate, mask: Mask 
     directory.mkdir(parents=True, exist_ok=True)
     document = documents.write(directory / "estimate.json", estimate.to_dict())
     written = [document, *_adjusted(directory, frame, estimate)]
-    return written + [save(made, directory / f"{name}.png") for name, made in pictures(frame, estimate, mask).items()]
+    written += [save(made, directory / f"{name}.png") for name, made in pictures(frame, estimate, mask).items()]
+    return without_older(directory, written, RESULTS)
 
 
 def _adjusted(directory: Path, frame: Frame, estimate: Estimate) -> list[Path]:

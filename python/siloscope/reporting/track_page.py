@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from siloscope.reporting.renewal import without_older
 from siloscope.reporting.report import Report, picture, table, text
 from siloscope.schema import documents
 from siloscope.tracking.tables import write_csv, write_jsonl, write_parquet
@@ -34,7 +35,7 @@ def write_track(directory: Path, found: Track, parquet: bool = False) -> list[Pa
     if parquet:
         written.append(write_parquet(directory / "readings.parquet", found))
     written.append(save(trend(found), directory / "trend.png"))
-    return [*written, report(found).write(directory / "report.html")]
+    return without_older(directory, [*written, report(found).write(directory / "report.html")], ["readings.parquet"])
 
 
 def trend(found: Track) -> Any:

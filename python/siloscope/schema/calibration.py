@@ -10,7 +10,7 @@ from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, mod
 
 from siloscope.errors import InputError
 from siloscope.parameters import PARAMETERS, POSE, SIZE
-from siloscope.reasons import CALIBRATION_REMARKS, FRAME_STATUSES
+from siloscope.reasons import CALIBRATION_REMARKS, FRAME_STATUSES, INPUT_REMARKS
 from siloscope.schema import CALIBRATION, files
 from siloscope.schema.fields import (
     Array,
@@ -59,7 +59,9 @@ def _flags(value: Any) -> Any:
 
 
 def _code(value: Any) -> str:
-    if value not in CALIBRATION_REMARKS:
+    """A remark's code, by itself as in files of version 0.1, or with its message and severity."""
+    value = value.get("code") if isinstance(value, dict) else value
+    if value not in CALIBRATION_REMARKS and value not in INPUT_REMARKS:
         raise wrong(f"is the unknown code {value!r}")
     return str(value)
 

@@ -9,6 +9,9 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from siloscope.errors import InputError, UsageError
 from siloscope.parameters import BIAS, NOISE, noise_std
 from siloscope.types.camera import Camera
@@ -58,6 +61,12 @@ class SensorProfile:
     def sigma(self, depth: float) -> float | None:
         """Standard deviation of the noise at a true depth, m."""
         return None if self.noise is None else noise_std(self.noise, depth)
+
+    def true_depth(self, measured: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Depth d with ``measured = d + offset + scale·d + quadratic·d²``, m."""
+        offset, scale, quadratic = self.bias
+        gain, rest = 1.0 + scale, measured - offset
+        return np.asarray(2.0 * rest / (gain + np.sqrt(np.maximum(gain**2 + 4.0 * quadratic * rest, 0.0))))
 
     def to_dict(self) -> dict[str, Any]:
         """What a result's ``config`` says about the sensor."""

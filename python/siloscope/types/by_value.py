@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields, is_dataclass
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,11 @@ class ByValue:
     def __repr__(self) -> str:
         lines = [f"    {name}={value}," for name, value in _told(self)]
         return "\n".join([f"{type(self).__name__}(", *lines, ")"])
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows: the `repr`, and a picture of what has one."""
+        html: str = import_module("siloscope.reporting.notebook").html(self)
+        return html
 
 
 def same(a: Any, b: Any) -> bool:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.parameters import OVALITY, PARAMETERS
-from siloscope.reasons import FRAME_STATUSES
+from siloscope.reasons import FRAME_STATUSES, calibration_remark
 from siloscope.schema import CALIBRATION
 from siloscope.types.by_value import ByValue
 from siloscope.types.floor import Floor, FloorMap, SeenCone
@@ -196,7 +196,7 @@ class Calibration(ByValue):
             "scale_std": self.scale_std,
             "moved_at": None if self.moved_at is None else self._move_to_dict(self.moved_at),
             "moves": [self._move_to_dict(move) for move in self.moves],
-            "quality": list(self.quality),
+            "quality": [calibration_remark(code) for code in self.quality],
             "counts": self.counts,
             "frames": [record.to_dict() for record in self.frames],
             "config": self.config,

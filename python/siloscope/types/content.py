@@ -9,44 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.reasons import CONTENT_NOTES, CONTENT_REMARKS
 from siloscope.schema import CONTENT
 from siloscope.types.by_value import ByValue
 from siloscope.types.floor import Floor
+from siloscope.types.remark import Remark
 from siloscope.types.surface_map import Shape, SurfaceMap
 from siloscope.types.vessel import Lengths, to_plain
-
-
-@dataclass(frozen=True)
-class Remark:
-    """A code of `siloscope.reasons.CONTENT_REMARKS` with what was seen."""
-
-    code: str
-    seen: str
-    """The figures that led to it, in words."""
-    refuses: bool = False
-    """Whether it leaves the reading without an answer."""
-
-    @property
-    def message(self) -> str:
-        """What it means."""
-        return CONTENT_REMARKS[self.code][0]
-
-    @property
-    def advice(self) -> str:
-        """What to do."""
-        return CONTENT_REMARKS[self.code][1]
-
-    @property
-    def severity(self) -> str:
-        """ "note", "warning" or "refusal"."""
-        return "refusal" if self.refuses else "note" if self.code in CONTENT_NOTES else "warning"
-
-    def to_dict(self) -> dict[str, Any]:
-        """Plain data."""
-        return {"code": self.code, "message": f"{self.message} ({self.seen})", "severity": self.severity,
-                "advice": self.advice, "seen": self.seen}  # fmt: skip
-
 
 DATUMS = ("cone-vertex", "floor", "lowest-seen")
 """From where heights are measured upwards."""

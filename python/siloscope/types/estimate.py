@@ -16,6 +16,7 @@ from siloscope.types.by_value import ByValue, same
 from siloscope.types.depth_frame import DepthFrame
 from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
+from siloscope.types.remark import Remark
 from siloscope.types.vessel import SiloGeometry, vessel_to_dict
 
 
@@ -105,6 +106,8 @@ class Estimate(ByValue):
     area_ratios: Ratios | None = None
     reason: str | None = None
     message: str | None = None
+    quality: tuple[Remark, ...] = ()
+    """What the inputs say against each other."""
     config: dict[str, Any] = field(default_factory=dict)
     """The effective settings."""
     timing_ms: dict[str, float] = field(default_factory=dict, compare=False)
@@ -169,6 +172,7 @@ class Estimate(ByValue):
             "status": self.status,
             "reason": self.reason,
             "message": self.message,
+            "quality": [remark.to_dict() for remark in self.quality],
             "method": self.method,
             **{name: getattr(self, name) for name in names},
             "std": {name: None if std is None else float(std[i]) for i, name in enumerate(names)},

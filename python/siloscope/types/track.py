@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
+from importlib import import_module
 from typing import Any
 
+from siloscope.errors import InputError
 from siloscope.schema import TRACK
 from siloscope.types.by_value import ByValue
 from siloscope.types.content import Content
@@ -171,6 +173,20 @@ class Track(ByValue):
     """Beginnings and ends of stretches without a reading, s."""
     name: str | None = None
     """The silo's."""
+
+    def to_pandas(self) -> Any:
+        """The readings as a pandas data frame, a row each, with the time as its index where all have one.
+
+        Raises `InputError` where pandas is not installed.
+        """
+        try:
+            pandas = import_module("pandas")
+        except ImportError:
+            raise InputError("a data frame needs pandas: pip install pandas; to_dict() does without") from None
+        table = pandas.DataFrame([reading.to_dict() for reading in self.readings])
+        if not self.readings or any(utc(reading.time) is None for reading in self.readings):
+            return table
+        return table.set_index(pandas.to_datetime(table.pop("time_utc"), utc=True))
 
     @property
     def counts(self) -> dict[str, int]:

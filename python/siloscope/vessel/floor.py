@@ -10,8 +10,8 @@ import math
 from dataclasses import replace
 
 from siloscope.types.calibration import Calibration
-from siloscope.types.content import Remark
 from siloscope.types.floor import Floor, SeenCone
+from siloscope.types.remark import Remark
 from siloscope.vessel.datasheet import Datasheet
 from siloscope.vessel.limits import LENGTH_STD
 

@@ -88,6 +88,13 @@ impl SurfaceFit {
         models.unwrap_or_default().iter().map(|(model, probability)| (model.slug(), *probability)).collect()
     }
 
+    /// Errors of the given intrinsics as the frame shows them: fx and fy (relative), cx and cy in units of the rays, k1;
+    /// None where they count as exact.
+    #[getter]
+    fn camera_error(&self) -> Option<[f64; 5]> {
+        self.fit.joint.as_ref().map(|joint| joint.answer.camera)
+    }
+
     /// Covariance (12, 12) if the intrinsics were exact: without what all frames of a camera have in common.
     #[getter]
     fn covariance_relative<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {

@@ -16,6 +16,7 @@ from siloscope.io.camera_files.distortion import DISTORTION_NAMES, distortion_mo
 from siloscope.io.camera_files.documents import from_document, joined
 from siloscope.io.camera_files.enumeration import from_enumeration
 from siloscope.io.camera_files.fields import CameraFile, camera, from_fields, from_matrix
+from siloscope.io.camera_files.numpy_file import is_numpy, numpy_fields
 from siloscope.io.camera_files.opencv import fields_of, is_file_storage
 from siloscope.io.camera_files.tables import calibrations, stream_cameras
 from siloscope.io.camera_files.writing import dump
@@ -56,6 +57,8 @@ def load(path: str | PathLike[str], size: tuple[int, int] | None = None) -> Came
 
 def read(path: str | PathLike[str]) -> CameraFile:
     """All that a camera file says; raises `InputError` naming the file and the field."""
+    if is_numpy(Path(path)):
+        return from_document(str(path), numpy_fields(Path(path)), calibration=True)
     return parse(str(path), text_of(Path(path)))
 
 

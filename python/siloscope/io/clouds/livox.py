@@ -1,4 +1,4 @@
-"""Recordings of Livox lidars: ``.lvx`` (version 1.1) and ``.lvx2``, a frame a second.
+"""Recordings of Livox lidars: ``.lvx`` (versions 1.0 and 1.1) and ``.lvx2``, a frame a second.
 
 Points tagged as dust are left out. Axes are the lidar's: x forward, y left, z up.
 """
@@ -83,8 +83,8 @@ class LivoxSource(FrameSource):
         self.packages: list[Package] = []
         self._accelerations: list[NDArray[np.float64]] = []
         try:
-            self.version, devices = self._read_header()
-            self._index(_HEADER + _PRIVATE + devices * _DEVICE[self.version])
+            self.version, first = self._read_header()
+            self._index(first)
             if not self.packages:
                 raise InputError(self.damage or f"{self.name}: the recording has no points; record again")
         except BaseException:
@@ -98,15 +98,24 @@ class LivoxSource(FrameSource):
         self._take_gravity()
 
     def _read_header(self) -> tuple[int, int]:
+        """Version, and where the first frame begins."""
         head = self.file.read(_HEADER + _PRIVATE)
         version = head[16] if len(head) == _HEADER + _PRIVATE else 0
         if version not in _DEVICE or head[17] not in (0, 1) or struct.unpack_from("<I", head, 20)[0] != _CODE:
             raise InputError(f"{self.name}: damaged, or an LVX of another version than 1.1 and 2.0; convert it to LAS")
         if version == 1 and head[17] == 0:
-            raise InputError(
-                f"{self.name}: an LVX of version 1.0, which is not read; convert it to LAS in Livox Viewer"
-            )
-        return version, head[28]
+            return version, self._first_frame_of_1_0(head[24], head[28])
+        return version, _HEADER + _PRIVATE + head[28] * _DEVICE[version]
+
+    def _first_frame_of_1_0(self, *devices: int) -> int:
+        """Where the frames of an LVX 1.0 begin, which had no frame duration and shorter devices: a frame's head names
+        its own place. Raises `InputError` where none does."""
+        for private, count in zip((1, _PRIVATE), devices, strict=True):
+            for device in (_DEVICE[1] - 1, _DEVICE[1]):
+                at = _HEADER + private + count * device
+                if self._bytes(at, 8) == struct.pack("<Q", at):
+                    return at
+        raise InputError(f"{self.name}: an LVX of version 1.0 without a frame; convert it to LAS in Livox Viewer")
 
     def _index(self, at: int) -> None:
         """Finds the packages by the frames' offsets, up to where the file breaks off."""

@@ -15,13 +15,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope import _core
 from siloscope.errors import InputError
 from siloscope.io.recordings import gravity, ros_messages
 from siloscope.io.recordings.recorded import RecordedSource
 from siloscope.io.recordings.recording import Entry, Recording, Topic, or_none
 from siloscope.io.recordings.streams import Stream
 from siloscope.io.recordings.wire import Wire
-from siloscope.io.source import Options
+from siloscope.io.source import Options, check_image_size
 from siloscope.types.camera import Camera
 from siloscope.types.frame import Frame
 
@@ -63,15 +64,18 @@ class OrbbecSource(RecordedSource):
 
     def _decode(self, entry: Entry) -> Frame:
         image = _image(self.recording, self.stream.topic, entry)
-        if image.encoding not in ("mono16", "Z16"):
+        if image.encoding == "RVL":
+            image = image._replace(data=_unpacked(image))
+        elif image.encoding not in ("mono16", "Z16"):
             raise InputError(
-                f"depth is stored as '{image.encoding or 'unknown'}', which is not read; record with format Y16 or Z16"
+                f"depth is stored as '{image.encoding or 'unknown'}', which is not read; "
+                "record with format Y16, Z16 or RVL"
             )
         # The SDK gives the step in bytes of a pixel, or 0; the pixels are always packed.
         image = image._replace(step=image.width * 2, big_endian=False)
         told = _tail_unit(image)
         return Frame(
-            depth=ros_messages.depth_pixels(image),
+            depth=ros_messages.depth_pixels(image._replace(encoding="mono16")),
             depth_unit=told,
             timestamp=self._time(entry),
             provenance={"depth_unit_from": "image" if told else self._unit_from},
@@ -121,6 +125,15 @@ def _stream(recording: Recording, topic: Topic, name: str) -> Stream:
 
 def _image(recording: Recording, topic: Topic, entry: Entry) -> ros_messages.Image:
     return ros_messages.read_image(recording.read(topic, entry))
+
+
+def _unpacked(image: ros_messages.Image) -> memoryview:
+    """The pixels of an image packed by RVL, whose bytes are the code alone; raises `InputError`."""
+    check_image_size("RVL image", image.width, image.height)
+    try:
+        return memoryview(_core.decompress_rvl(bytes(image.data), image.width * image.height).tobytes())
+    except ValueError as error:
+        raise InputError(f"damaged RVL ({error}); record again") from None
 
 
 def _tail_unit(image: ros_messages.Image) -> float | None:

@@ -1,0 +1,75 @@
+"""What a refused frame would show if one of its inputs were not as told."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from siloscope.estimation.inputs import Prepared, PreparedDepth
+from siloscope.estimation.methods import priors_of
+from siloscope.estimation.prior_checks import prior_remarks, way_remarks
+from siloscope.estimation.settings import Settings
+from siloscope.types.estimate import Estimate
+from siloscope.types.remark import Remark
+
+Run = Callable[[Prepared, Settings, dict[str, Any]], Estimate]
+"""A method of `locate`."""
+
+TYPICAL = 2.0
+"""Median depth to which disparities are brought, whose scale is not known, m."""
+
+
+def looked_at_again(
+    run: Run, estimate: Estimate, prepared: Prepared, settings: Settings
+) -> tuple[Estimate, list[Remark]]:
+    """An answer with what it says against its priors; what a refused frame says if one of them is left out."""
+    if estimate.ok:
+        said = [*prior_remarks(estimate, priors_of(prepared, settings)), *way_remarks(estimate, prepared, settings)]
+        return estimate, said
+    for remark, free in without_priors(run, prepared, settings, estimate.config):
+        return free, [remark]
+    if settings.vessels == "any" and settings.start is None:
+        return estimate, list(other_readings(run, prepared, settings, estimate.config))
+    return estimate, []
+
+
+def without_priors(
+    run: Run, prepared: Prepared, settings: Settings, config: dict[str, Any]
+) -> Iterator[tuple[Remark, Estimate]]:
+    """The prior that keeps a refused frame from an answer, and the answer without it."""
+    if settings.gravity is not None:
+        free = run(prepared, replace(settings, gravity=None), config)
+        if free.ok and free.pose is not None:
+            down = settings.gravity / np.linalg.norm(settings.gravity)
+            angle = math.degrees(math.acos(max(-1.0, min(1.0, float(down @ free.pose.axis_direction)))))
+            yield Remark("gravity-contradicts", f"without it the axis is {angle:.1f}° off it", True), free
+    if settings.diameter is not None:
+        free = run(prepared, replace(settings, diameter=None), config)
+        radius = free.silo.radius
+        if free.ok and radius is not None:
+            seen = f"without it the diameter seen is {2.0 * radius:.3f} m, not {settings.diameter:g} m"
+            yield Remark("diameter-contradicted", seen, True), free
+
+
+def other_readings(run: Run, prepared: Prepared, settings: Settings, config: dict[str, Any]) -> Iterator[Remark]:
+    """Warnings of a refused image that gives an answer if its values are something else than depth."""
+    if not isinstance(prepared, PreparedDepth) or prepared.turn is not None:
+        return
+    free = replace(settings, gravity=None, diameter=None, ratios=False, start=None)
+    stretch = np.sqrt(1.0 + np.sum(prepared.camera.rays() ** 2, axis=2))
+    if _answers(run, prepared, free, config, prepared.depth / stretch):
+        yield Remark("ray-length-as-depth", "read as ray lengths, the frame gives an answer")
+    seen = prepared.depth > 0.0
+    if seen.any():
+        scale = TYPICAL * float(np.median(prepared.depth[seen]))
+        inverse = np.where(seen, scale / np.where(seen, prepared.depth, 1.0), 0.0)
+        if _answers(run, prepared, free, config, inverse):
+            yield Remark("disparity-as-depth", "read as disparities, the frame gives an answer")
+
+
+def _answers(run: Run, prepared: PreparedDepth, settings: Settings, config: dict[str, Any], depth: Any) -> bool:
+    return run(replace(prepared, depth=np.ascontiguousarray(depth, np.float32)), settings, config).ok
