@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -160,8 +161,8 @@ def test_a_calibration_beside_and_given_is_told(tmp_path: Path) -> None:
 def test_calibrations_stored_by_numpy_are_read(tmp_path: Path, names: tuple[str, str]) -> None:
     matrix = np.array([[310.5, 0.0, 161.2], [0.0, 309.8, 118.9], [0.0, 0.0, 1.0]])
     coefficients = np.array([[0.1, -0.02, 0.001, 0.002, 0.0]])
-    extra = {"rvecs": np.zeros((3, 3, 1))}
-    np.savez(tmp_path / "calib.npz", **{names[0]: matrix, names[1]: coefficients}, **extra)
+    stored: dict[str, Any] = {names[0]: matrix, names[1]: coefficients, "rvecs": np.zeros((3, 3, 1))}
+    np.savez(tmp_path / "calib.npz", **stored)
     camera = camera_files.load(tmp_path / "calib.npz", (320, 240))
     assert (camera.fx, camera.fy, camera.cx, camera.cy) == (310.5, 309.8, 161.2, 118.9)
     assert camera.distortion[:4] == (0.1, -0.02, 0.001, 0.002)

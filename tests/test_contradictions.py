@@ -24,8 +24,8 @@ from siloscope.simulation import Feed, sensor_model
 from siloscope.simulation.scenarios import random_scene, scenario
 from siloscope.types.intrinsics import CALIBRATED
 
-sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
-from contradictions import WRONG, outcomes
+sys.path.append(str(Path(__file__).parents[1]))
+from benchmarks.contradictions import WRONG, outcomes
 
 PROFILE = "realsense-d435"
 CAMERA = Camera(160, 120, 142.6, 142.6, 79.5, 59.5)
@@ -56,6 +56,21 @@ def test_depth_out_of_the_sensors_range_is_refused(factor: float) -> None:
     assert estimate.message is not None
     assert "depth unit" in estimate.message
     assert ("outside-sensor-range", "refusal") in codes(estimate)
+
+
+@pytest.mark.parametrize(("farthest", "told"), [(9.9, []), (13.0, ["warning"]), (15.0, ["refusal"])])
+def test_a_surface_a_little_beyond_the_range_is_a_warning(farthest: float, told: list[str]) -> None:
+    depth = np.linspace(1.0, farthest, 160 * 120, dtype=np.float32).reshape(120, 160)
+    assert [remark.severity for remark in range_remarks(depth, sensors.load(PROFILE))] == told
+
+
+def test_a_sensor_that_measures_too_far_is_judged_by_the_true_depth() -> None:
+    """The paper's Silo 2: 7.2 m away, 8.2 m as its Astra S measures, which reaches 8 m."""
+    seen = replace(scenario("silo2"), feed=None, camera=CAMERA, sensor=sensor_model("orbbec-astra-s")).render()
+    depth = np.nan_to_num(seen.measured).astype(np.float32)
+    assert np.mean(depth > 8.0) > 0.05
+    assert range_remarks(depth, sensors.load("orbbec-astra-s")) == ()
+    assert range_remarks(4.0 * depth, sensors.load("orbbec-astra-s"))[0].refuses
 
 
 def test_trusted_depth_is_answered_with_a_warning() -> None:
@@ -165,7 +180,7 @@ def test_filled_holes_are_named_and_coarse_values_are_not() -> None:
     filled[20:90, 60:100] = filled[20:90, 59:60]
     assert [remark.code for remark in hole_remarks(filled)] == ["hole-filled"]
     assert list(hole_remarks(DEPTH.astype(np.float32))) == []
-    assert list(hole_remarks(np.round(DEPTH.astype(np.float32), 1))) == []
+    assert list(hole_remarks(DEPTH.round(1).astype(np.float32))) == []
     assert ("hole-filled", "warning") in codes(siloscope.locate(filled, CAMERA, sensor=PROFILE))
 
 
@@ -197,7 +212,7 @@ def test_right_frames_of_many_silos_are_not_blamed() -> None:
 
 
 def test_calibrate_measure_and_track_refuse_and_trust_alike(tmp_path: Path) -> None:
-    wrong = {"sensor": PROFILE, "depth_unit": 0.006}
+    wrong: dict[str, Any] = {"sensor": PROFILE, "depth_unit": 0.006}
     refused = siloscope.calibrate([RAW], camera=CAMERA, **wrong)
     assert not refused.ok
     assert refused.message is not None

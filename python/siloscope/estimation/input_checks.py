@@ -23,11 +23,14 @@ SAMPLES = 5_000
 """Pixels, evenly spread, from which the frame's depths are judged."""
 
 MOST_BEYOND = 0.05
-"""Fraction of the depths that a right frame may have beyond the sensor's range: of 1,000 simulated ones none has any
-(`benchmarks/contradictions.py`); the room is for false returns."""
+"""Fraction of the depths that a right frame may have beyond the sensor's range; the room is for false returns."""
 
 MOST_TOO_NEAR = 0.25
 """The same before its nearest depth, where dust, a rim or the wall beside the camera may lie."""
+
+LEEWAY = math.sqrt(2.0)
+"""Factor by which a sensor may measure beyond its nominal range, with more noise: halfway, as a ratio, to the least
+mistake in a unit, 2. Before its nearest depth it measures nothing."""
 
 SAME_UNIT = 0.01
 """Fraction by which two units of one sensor may differ, as written."""
@@ -84,16 +87,22 @@ def _turned(prepared: Prepared) -> Iterator[Remark]:
 
 
 def range_remarks(depth: NDArray[np.float32], profile: SensorProfile) -> tuple[Remark, ...]:
-    """A refusal where a profile's sensor could not have measured the depths (H, W), metres, 0 for none."""
+    """What a profile's range says of the depths (H, W), metres, 0 for none, once its own error is taken off.
+
+    A warning where some lie beyond it, a refusal where they do so by more than `LEEWAY`, or lie too near.
+    """
     near, far = profile.range
     step = max(1, round(math.sqrt(depth.size / SAMPLES)))
-    seen = depth[::step, ::step]
-    seen = seen[seen > 0.0]
-    if not len(seen) or (np.mean(seen > far) <= MOST_BEYOND and np.mean(seen < near) <= MOST_TOO_NEAR):
+    sample = depth[::step, ::step].astype(np.float64)
+    seen = profile.true_depth(sample[sample > 0.0])
+    if not len(seen):
+        return ()
+    too_near = bool(np.mean(seen < near) > MOST_TOO_NEAR)
+    if not too_near and np.mean(seen > far) <= MOST_BEYOND:
         return ()
     low, high = np.quantile(seen, (0.05, 0.95))
     figures = f"90 % of it from {low:.2f} to {high:.2f} m, {profile.name} measures {near:g} to {far:g} m"
-    return (Remark("outside-sensor-range", figures, True),)
+    return (Remark("outside-sensor-range", figures, too_near or bool(np.mean(seen > LEEWAY * far) > MOST_BEYOND)),)
 
 
 def _unit(frame: Frame, profile: SensorProfile, depth_unit: float | None) -> tuple[Remark, ...]:
