@@ -79,14 +79,16 @@ class Settings:
     def with_gravity_of(self, prepared: Prepared) -> Settings:
         """With gravity in the optical frame: the caller's, who gives it in the file's, else the frame's own.
 
-        It is a line's direction to the fit, and made to point forward.
+        To a cloud's fit it is a line's direction, and a caller may have its signs from an accelerometer: both are made
+        to point forward. What an image's recording says stays, and the fit refuses a camera above the horizon.
         """
         turn = prepared.turn
         if self.gravity is None:
             down = None if prepared.gravity is None else _direction(prepared.gravity)
         else:
             down = self.gravity if turn is None else turn.rotation @ self.gravity
-        if down is None or down[2] >= 0.0:
+        recorded = self.gravity is None and isinstance(prepared, PreparedDepth)
+        if down is None or down[2] >= 0.0 or recorded:
             return replace(self, gravity=down)
         return replace(self, gravity=-down, gravity_is_behind=True)
 
