@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from siloscope.reasons import CONTENT_REMARKS, INPUT_REMARKS, estimate_refusals, sentence
+from siloscope.types.calibration import Calibration
 from siloscope.types.content import Content
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
@@ -45,24 +47,24 @@ def floating_returns(depth: NDArray[Any]) -> float:
     return float(np.mean(near[4] < FLOATING * typical))
 
 
-def unlocated(data: Frame | ArrayLike, estimate: Estimate, source: str) -> Content:
+def unlocated(data: Frame | ArrayLike, refused: Estimate | Calibration, source: str) -> Content:
     """The answer where the frame does not show the silo's axis: for dust, for what is no silo, else for little wall."""
+    said = refused.quality if isinstance(refused, Estimate) else ()
+    answer = Content("refused", refused.reason, refused.message, source=source, config=refused.config, quality=said)
     depth = data.depth if isinstance(data, Frame) else np.asarray(data)
     dust = floating_returns(np.asarray(depth)) if depth is not None and np.ndim(depth) == 2 else 0.0
-    if dust > DUSTY and estimate.reason not in INPUT_REMARKS:
-        return _dusty(f"{100 * dust:.0f} % of the returns float alone", source, estimate)
-    message = str(estimate.message)
-    if estimate.reason in NO_SILO:
+    if dust > DUSTY and refused.reason not in INPUT_REMARKS:
+        return _dusty(answer, f"{100 * dust:.0f} % of the returns float alone")
+    message = str(refused.message)
+    if refused.reason in NO_SILO:
         message = f"This does not look like the inside of a silo: {message[0].lower()}{message[1:]}"
-    return Content("refused", estimate.reason, message, source=source, config=estimate.config,
-                   quality=estimate.quality)  # fmt: skip
+    return replace(answer, message=message)
 
 
-def _dusty(seen: str, source: str, estimate: Estimate) -> Content:
-    remark = Remark("dust-or-fog", seen, True)
+def _dusty(answer: Content, seen: str) -> Content:
     message = sentence(CONTENT_REMARKS["dust-or-fog"], f" ({seen})")
-    return Content("refused", "dust-or-fog", message, source=source, config=estimate.config,
-                   quality=(*estimate.quality, remark))  # fmt: skip
+    remark = Remark("dust-or-fog", seen, True)
+    return replace(answer, reason="dust-or-fog", message=message, quality=(*answer.quality, remark))
 
 
 def spoken_alone(said: tuple[Remark, ...]) -> tuple[Remark, ...]:
