@@ -156,7 +156,7 @@ def test_an_interruption_is_told_like_every_error(tmp_path: Path) -> None:
     arguments = ["simulate", "--steps", "100000", "--out", str(tmp_path / "frames"), "--json"]
     words = [sys.executable, "-m", "siloscope", *arguments]
     with subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as running:
-        while running.poll() is None and not (tmp_path / "frames").exists():
+        while running.poll() is None and not any(tmp_path.iterdir()):
             time.sleep(0.01)
         running.send_signal(signal.SIGINT)
         try:
@@ -165,6 +165,7 @@ def test_an_interruption_is_told_like_every_error(tmp_path: Path) -> None:
             running.kill()
     assert (running.returncode, err) == (outcome.INTERRUPTED, "error: interrupted\n")
     assert json.loads(out)["error"] == "interrupted"
+    assert not any(tmp_path.iterdir())
 
 
 def test_an_interruption_while_a_module_is_imported_ends_with_the_same_code(tmp_path: Path) -> None:

@@ -165,7 +165,7 @@ def _head(path: Path) -> bytes:
     except InputError:
         raise
     except FileNotFoundError:
-        raise InputError(f"{path}: no such file; check the path") from None
+        raise InputError(f"{path}: no such file; give the path of a frame that exists") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: can't be read ({error}); check the path and its permissions") from None
     if not head:
