@@ -11,9 +11,10 @@ from typing import Any
 import pytest
 
 import siloscope
-from siloscope.cli import main, options, simulate
+from siloscope.cli import main, options
 from siloscope.cli.inputs import expanded
 from siloscope.errors import InputError, UsageError
+from siloscope.io import writers
 
 Captured = pytest.CaptureFixture[str]
 
@@ -116,14 +117,14 @@ def test_no_older_result_stays_beside_a_refusal(command: str, document: str, fra
 
 
 def test_an_interrupted_simulation_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    written = simulate._write_frame
+    written = writers.write_png
 
-    def interrupted(frame: Any, out: Path, name: str, *rest: Any) -> Any:
-        if name == "frame_0001":
+    def interrupted(path: Path, depth: Any) -> None:
+        if path.name == "frame_0001.png":
             raise KeyboardInterrupt
-        return written(frame, out, name, *rest)
+        written(path, depth)
 
-    monkeypatch.setattr(simulate, "_write_frame", interrupted)
+    monkeypatch.setattr(writers, "write_png", interrupted)
     size = ["--width", "80", "--height", "60"]
     assert main(["simulate", "--steps", "3", *size, "--out", str(tmp_path / "set")]) == 130
     assert list(tmp_path.iterdir()) == []

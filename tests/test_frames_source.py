@@ -139,7 +139,8 @@ def test_frames_can_be_taken_by_number(png: Path) -> None:
     source = siloscope.open([png, png], depth_unit=0.001)
     assert source.frame_count == 2
     assert np.array_equal(source[1].depth, RAW)
-    for index in (2, -1):
+    assert np.array_equal(source[-2].depth, RAW)
+    for index in (2, -3):
         with pytest.raises(IndexError):
             source[index]
 

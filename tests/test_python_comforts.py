@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import types
 from dataclasses import replace
+from operator import methodcaller
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,10 @@ from siloscope.simulation.scenarios import scenario
 CAMERA = Camera(160, 120, 142.6, 142.6, 79.5, 59.5)
 SCENE = replace(scenario("silo1"), camera=CAMERA)
 RAW = np.rint(np.nan_to_num(SCENE.render().measured) / 0.001).astype(np.uint16)
+
+
+as_in_a_notebook = methodcaller("_repr_html_")
+"""What a notebook asks a result for."""
 
 
 @pytest.fixture
@@ -66,14 +71,14 @@ def test_messages_name_arguments_in_python_and_options_on_the_command_line() -> 
 
 def test_a_notebook_shows_the_picture_beside_the_numbers() -> None:
     estimate = siloscope.locate(RAW, CAMERA, depth_unit=0.001)
-    shown = estimate._repr_html_()
+    shown = as_in_a_notebook(estimate)
     assert shown.startswith("<pre>Estimate(")
     assert "data:image/png;base64," in shown
     refused = siloscope.locate(np.full((120, 160), 2.0), CAMERA)
-    assert "img" not in refused._repr_html_()
-    assert "img" in siloscope.measure(RAW, None, CAMERA, depth_unit=0.001, bottom="cone")._repr_html_()
+    assert "img" not in as_in_a_notebook(refused)
+    assert "img" in as_in_a_notebook(siloscope.measure(RAW, None, CAMERA, depth_unit=0.001, bottom="cone"))
     silo = siloscope.calibrate([RAW], camera=CAMERA, depth_unit=0.001)
-    assert silo._repr_html_().startswith("<pre>Calibration(")
+    assert as_in_a_notebook(silo).startswith("<pre>Calibration(")
 
 
 def test_a_track_becomes_a_data_frame_or_says_what_it_needs(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,10 @@ import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-_OPTION = re.compile(r"--([a-z][a-z-]*)(?: (?:FILE|NAME|DIR|FRAME|KIND|M)\b)?")
+_OTHERS = "compression-mode|export_depth_images"
+"""Options of other programs that messages name; they stay as they are."""
+
+_OPTION = re.compile(rf"--(?!{_OTHERS})([a-z][a-z-]*)(?: (?:FILE|NAME|DIR|FRAME|KIND|M)\b)?")
 
 
 class _Speech:

@@ -208,11 +208,11 @@ def _write(
 @contextmanager
 def _whole(out: Path) -> Iterator[Path]:
     """A folder beside `out` whose files go there once all are written; interrupted, none does."""
-    with writing(out):
-        place = out.resolve()
-        folder = place.with_name(f".{place.name}-{os.getpid()}")
-        folder.mkdir(parents=True)
+    place = out.resolve()
+    folder = place.with_name(f".{place.name}-{os.getpid()}")
     try:
+        with writing(out):
+            folder.mkdir(parents=True)
         yield folder
         with writing(out):
             place.mkdir(exist_ok=True)

@@ -99,9 +99,14 @@ UNREAD: tuple[Known, ...] = (
     Known("a RAR archive", _UNPACK, (b"Rar!",)),
     Known("a ZIP archive", _UNPACK, (b"PK\x03\x04", b"PK\x05\x06")),
     Known("a tar archive", _UNPACK, suffixes=(".tar",)),
-    Known("a JSON document", "it has no frame; camera files are given with --camera", (b"{", b"[{")),
-    Known("an XML document", "it has no frame; camera files are given with --camera", (b"<?xml",)),
-    Known("a YAML document", "it has no frame; camera files are given with --camera", (b"%YAML",), (".yaml", ".yml")),
+    Known("a JSON document", "it has no frame; give a camera file as the camera", (b"{", b"[{")),
+    Known("an XML document", "it has no frame; give a camera file as the camera", (b"<?xml",)),
+    Known(
+        "a YAML document",
+        "it has no frame; give a camera file as the camera",
+        (b"%YAML",),
+        (".yaml", ".yml"),
+    ),
 )
 """In the order in which they are asked; a longer mark stands before a shorter one that it begins with."""
 

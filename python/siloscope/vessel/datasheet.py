@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from siloscope.errors import UsageError
+from siloscope.types.camera import is_number
 from siloscope.vessel.limits import LONGEST
 
 if TYPE_CHECKING:
@@ -37,15 +38,16 @@ class Datasheet:
     def __post_init__(self) -> None:
         for name, least in (("diameter", 0.01), ("cylinder", 0.0), ("cone", 0.0)):
             value = getattr(self, name)
-            if value is not None and not least <= value <= LONGEST:
+            if value is not None and not (is_number(value) and least <= value <= LONGEST):
                 raise UsageError(f"{name} must be between {least:g} and {LONGEST:g} m, got {value}")
         if self.bottom not in (None, *BOTTOMS):
             raise UsageError(f"bottom '{self.bottom}': give one of {', '.join(BOTTOMS)}")
         if self.bottom == "flat" and self.cone:
             raise UsageError(f"a flat bottom has no cone of {self.cone:g} m; give one of the two")
         for name in ("outlet_diameter", "outlet_length"):
-            if not 0.0 <= getattr(self, name) <= 20.0:
-                raise UsageError(f"{name.replace('_', '-')} must be between 0 and 20 m, got {getattr(self, name)}")
+            value = getattr(self, name)
+            if not (is_number(value) and 0.0 <= value <= 20.0):
+                raise UsageError(f"{name.replace('_', '-')} must be between 0 and 20 m, got {value}")
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
