@@ -16,7 +16,7 @@ import siloscope
 from siloscope import Camera, UsageError, sensors
 from siloscope.cli import main
 from siloscope.estimation.input_checks import camera_remarks, hole_remarks, range_remarks
-from siloscope.estimation.prior_checks import prior_remarks
+from siloscope.estimation.prior_checks import diameter_off, prior_remarks
 from siloscope.estimation.priors import Priors
 from siloscope.io.writers import write_camera, write_png
 from siloscope.reasons import REMARKS
@@ -120,6 +120,16 @@ def test_a_tape_far_off_a_sensor_without_a_profile_is_refused() -> None:
     trusting = siloscope.locate(1.3 * DEPTH, CAMERA, diameter=DIAMETER, trust="diameter-contradicted")
     assert codes(trusting) == [("diameter-contradicted", "warning")]
     assert trusting.silo.radius == pytest.approx(DIAMETER / 2.0, abs=0.003)
+
+
+def test_a_tape_within_what_a_sensor_may_be_off_is_not_blamed() -> None:
+    free = siloscope.locate(DEPTH, CAMERA)
+    for by, blamed in ((0.98, False), (1.05, False), (0.8, True), (1.25, True)):
+        off = diameter_off(free, Priors(sensors.UNKNOWN, by * DIAMETER))
+        assert (off is not None) == blamed, by
+    assert diameter_off(free, Priors(sensors.load(PROFILE), 1.15 * DIAMETER)) == pytest.approx(
+        -0.15 * DIAMETER, rel=0.1
+    )
 
 
 @pytest.mark.parametrize("aside", [(0.15, 0.0, 0.0), (-0.1, 0.2, 0.0)])

@@ -52,15 +52,23 @@ def _scale(estimate: Estimate, priors: Priors) -> Iterator[Remark]:
 
 def _radius(estimate: Estimate, priors: Priors) -> Iterator[Remark]:
     """The tape against the wall where the depth scale is exact, and does not give."""
+    if priors.diameter is None or priors.profile.bias_std[1] > 0.0:
+        return
+    off = diameter_off(estimate, priors)
+    if off is not None:
+        percent, seen = 100.0 * off / priors.diameter, priors.diameter + off
+        figures = f"the diameter seen is {seen:.3f} m, {percent:+.1f} % off the {priors.diameter:g} m given"
+        yield Remark("diameter-contradicted", figures, True)
+
+
+def diameter_off(estimate: Estimate, priors: Priors) -> float | None:
+    """How far the diameter seen is off the one given, m; None where that is no contradiction."""
     radius, std = estimate.silo.radius, estimate.silo_std.radius
-    if priors.diameter is None or priors.profile.bias_std[1] > 0.0 or radius is None or std is None:
-        return
+    if priors.diameter is None or radius is None or std is None:
+        return None
+    allowed = math.hypot(WALL_FORM, priors.profile.bias_std[1]) * priors.diameter
     off = 2.0 * radius - priors.diameter
-    if abs(off) <= CONTRADICTION * math.hypot(2.0 * std, priors.diameter_std, WALL_FORM * priors.diameter):
-        return
-    percent = 100.0 * off / priors.diameter
-    figures = f"the diameter seen is {2.0 * radius:.3f} m, {percent:+.1f} % off the {priors.diameter:g} m given"
-    yield Remark("diameter-contradicted", figures, True)
+    return off if abs(off) > CONTRADICTION * math.hypot(2.0 * std, priors.diameter_std, allowed) else None
 
 
 def _bias(estimate: Estimate, priors: Priors) -> Iterator[Remark]:
@@ -93,14 +101,21 @@ def _intrinsics(estimate: Estimate, priors: Priors) -> Iterator[Remark]:
 
 
 def _gravity(estimate: Estimate, priors: Priors) -> Iterator[Remark]:
+    found = gravity_off(estimate, priors)
+    if found is not None:
+        angle, std = found
+        figures = f"{math.degrees(angle):.1f}° apart, {angle / std:.0f} standard deviations"
+        yield Remark("gravity-contradicts", figures, True)
+
+
+def gravity_off(estimate: Estimate, priors: Priors) -> tuple[float, float] | None:
+    """Angle from gravity to the axis and its standard deviation, rad; None where that is no contradiction."""
     if priors.gravity is None or estimate.pose is None or estimate.covariance is None:
-        return
+        return None
     down = priors.gravity / np.linalg.norm(priors.gravity)
     angle = math.acos(max(-1.0, min(1.0, float(down @ estimate.pose.axis_direction))))
     std = math.hypot(priors.gravity_std, math.sqrt(float(np.linalg.eigvalsh(estimate.covariance[:2, :2])[-1])))
-    if angle > CONTRADICTION * std:
-        figures = f"{math.degrees(angle):.1f}° apart, {angle / std:.0f} standard deviations"
-        yield Remark("gravity-contradicts", figures, True)
+    return (angle, std) if angle > CONTRADICTION * std else None
 
 
 def way_remarks(estimate: Estimate, prepared: Prepared, settings: Settings) -> Iterator[Remark]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from siloscope.estimation.inputs import Prepared, PreparedDepth
 from siloscope.estimation.methods import priors_of
-from siloscope.estimation.prior_checks import prior_remarks, way_remarks
+from siloscope.estimation.prior_checks import diameter_off, gravity_off, prior_remarks, way_remarks
 from siloscope.estimation.settings import Settings
 from siloscope.types.estimate import Estimate
 from siloscope.types.remark import Remark
@@ -40,18 +40,19 @@ def looked_at_again(
 def without_priors(
     run: Run, prepared: Prepared, settings: Settings, config: dict[str, Any]
 ) -> Iterator[tuple[Remark, Estimate]]:
-    """The prior that keeps a refused frame from an answer, and the answer without it."""
+    """The prior that keeps a refused frame from an answer and contradicts it, and the answer without it."""
+    priors = priors_of(prepared, settings)
     if settings.gravity is not None:
         free = run(prepared, replace(settings, gravity=None), config)
-        if free.ok and free.pose is not None:
-            down = settings.gravity / np.linalg.norm(settings.gravity)
-            angle = math.degrees(math.acos(max(-1.0, min(1.0, float(down @ free.pose.axis_direction)))))
-            yield Remark("gravity-contradicts", f"without it the axis is {angle:.1f}° off it", True), free
+        if free.ok and (aside := gravity_off(free, priors)) is not None:
+            yield (
+                Remark("gravity-contradicts", f"without it the axis is {math.degrees(aside[0]):.1f}° off it", True),
+                free,
+            )
     if settings.diameter is not None:
         free = run(prepared, replace(settings, diameter=None), config)
-        radius = free.silo.radius
-        if free.ok and radius is not None:
-            seen = f"without it the diameter seen is {2.0 * radius:.3f} m, not {settings.diameter:g} m"
+        if free.ok and (off := diameter_off(free, priors)) is not None:
+            seen = f"without it the diameter seen is {settings.diameter + off:.3f} m, not {settings.diameter:g} m"
             yield Remark("diameter-contradicted", seen, True), free
 
 
