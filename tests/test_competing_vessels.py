@@ -25,9 +25,7 @@ def true_camera(taken: Sample) -> siloscope.Camera:
     return siloscope.Camera(**told, distortion_model="brown_conrady", distortion=(k1, 0, 0, 0, 0))
 
 
-def answered(
-    folder: Path, kind: str, seed: int, vessels: str = "any", **known: Any
-) -> tuple[Verdict, dict[str, Any]]:
+def answered(folder: Path, kind: str, seed: int, vessels: str = "any", **known: Any) -> tuple[Verdict, dict[str, Any]]:
     taken = single(folder, kind, seed, 320)
     depth = taken.depth.astype(np.float32) * 1e-3
     told = {"sensor": taken.truth["sensor"], "intrinsics": "exact", "vessels": vessels, **known}

@@ -19,6 +19,9 @@ from siloscope.types.remark import Remark
 Run = Callable[[Prepared, Settings, dict[str, Any]], Estimate]
 """A method of `locate`."""
 
+LEAST = 1e-3
+"""Least value that has an inverse worth asking, m."""
+
 TYPICAL = 2.0
 """Median depth to which disparities are brought, whose scale is not known, m."""
 
@@ -64,7 +67,7 @@ def other_readings(run: Run, prepared: Prepared, settings: Settings, config: dic
     stretch = np.sqrt(1.0 + np.sum(prepared.camera.rays() ** 2, axis=2))
     if _answers(run, prepared, free, config, prepared.depth / stretch):
         yield Remark("ray-length-as-depth", "read as ray lengths, the frame gives an answer")
-    seen = prepared.depth > 0.0
+    seen = prepared.depth > LEAST
     if seen.any():
         scale = TYPICAL * float(np.median(prepared.depth[seen]))
         inverse = np.where(seen, scale / np.where(seen, prepared.depth, 1.0), 0.0)
