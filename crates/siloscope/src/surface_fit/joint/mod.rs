@@ -10,6 +10,7 @@ pub mod correlation;
 pub mod ends;
 pub mod factor;
 pub mod form;
+pub mod form_share;
 pub mod frame;
 pub mod judge;
 pub mod labels;
@@ -23,7 +24,6 @@ pub mod select;
 pub mod solve;
 pub mod summary;
 pub mod system;
-pub mod wall_line;
 
 use crate::SiloPose;
 use crate::Vec3;

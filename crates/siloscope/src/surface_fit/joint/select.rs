@@ -1,14 +1,13 @@
 //! Models weighed against each other by Laplace evidence, and the answer averaged over them.
 
 use crate::geometry::surface::Part;
+use crate::surface_fit::joint::form_share;
 use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::model::{Model, prior};
 use crate::surface_fit::joint::parameters::{CAMERA, SIZE};
 use crate::surface_fit::joint::solve::JointFit;
 use crate::surface_fit::joint::system::Posterior;
-use crate::surface_fit::joint::wall_line;
 use nalgebra::{DMatrix, DVector};
-use std::ops::AddAssign;
 
 /// A model's log evidence and what it says.
 #[derive(Debug, Clone)]
@@ -94,8 +93,7 @@ pub fn averaged(frame: &Frame, fits: &[JointFit], weighed: &[Weighed], exact_cam
         let mean = ideal_mean(frame, fit, w.model, &posterior).unwrap_or_else(|| wide.clone());
         let off = &mean - &wide;
         let mut covariance = posterior.covariance();
-        let line = wall_line::share(&fit.state, &wide, &covariance);
-        covariance.view_mut((0, 0), (4, 4)).add_assign(line);
+        form_share::widen(&fit.state, &wide, &mut covariance);
         parts.push((w.probability, mean, covariance + &off * off.transpose()));
     }
     let total: f64 = parts.iter().map(|p| p.0).sum();

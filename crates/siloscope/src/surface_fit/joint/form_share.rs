@@ -1,4 +1,6 @@
-//! What a bent wall leaves open of its axis.
+//! What a wall's form leaves open of its axis and its radius.
+//!
+//! A wall in rings has no one radius: what is called so is known to the rings' own spread.
 //!
 //! The axis is the straight line through the wall, and which line that is depends on where the wall begins and ends. The
 //! form's Legendre polynomials run from the camera's height to the joint, or to the lowest tiles. A wall that goes on by
@@ -7,11 +9,14 @@
 
 use crate::Vec3;
 use crate::geometry::pose::SiloPose;
-use crate::surface_fit::joint::parameters::{CYLINDER_FORM, JointState};
+use crate::surface_fit::joint::parameters::{CYLINDER_FORM, JointState, RADIUS};
 use nalgebra::{DMatrix, DVector, Matrix4, Vector4};
+use std::ops::AddAssign;
 
 /// Columns of the bend's degrees 2 and 3, cosine and sine.
-const BEND: [usize; 4] = [CYLINDER_FORM + 8, CYLINDER_FORM + 9, CYLINDER_FORM + 10, CYLINDER_FORM + 11];
+const BEND: [usize; 4] = [RINGS, RINGS + 1, RINGS + 2, RINGS + 3];
+/// The rings' columns come first, degrees 1 to 8.
+const RINGS: usize = 8;
 /// Cameras hang within so much of the wall's height of its upper end.
 const ABOVE: f64 = 0.1;
 /// How much wall may lie below the lowest tiles, where feed or a floor ends the view: none to as much again.
@@ -19,13 +24,26 @@ const BELOW: [f64; 3] = [0.0, 0.5, 1.0];
 /// Step of the differences, metres.
 const STEP: f64 = 1e-5;
 
-/// Covariance that it adds to the pose.
-pub fn share(state: &JointState, mean: &DVector<f64>, covariance: &DMatrix<f64>) -> Matrix4<f64> {
-    if !state.has_cylinder {
-        return Matrix4::zeros();
+/// Widens a covariance of all parameters by it.
+pub fn widen(state: &JointState, mean: &DVector<f64>, covariance: &mut DMatrix<f64>) {
+    if state.has_cylinder {
+        let (pose, radius) = (axis(state, mean, covariance), rings(mean, covariance));
+        covariance.view_mut((0, 0), (4, 4)).add_assign(pose);
+        covariance[(RADIUS, RADIUS)] += radius;
     }
-    let c = Vector4::from_fn(|k, _| mean[BEND[k]]);
-    let moment = c * c.transpose() + Matrix4::from_fn(|i, j| covariance[(BEND[i], BEND[j])]);
+}
+
+/// Mean square of the rings over the height: Σ c_k² / (2k + 1).
+fn rings(mean: &DVector<f64>, covariance: &DMatrix<f64>) -> f64 {
+    let square = |k: usize| (mean[k].powi(2) + covariance[(k, k)]) / (2 * (k - CYLINDER_FORM) + 3) as f64;
+    (CYLINDER_FORM..CYLINDER_FORM + RINGS).map(square).sum()
+}
+
+/// Covariance that the bend adds to the pose.
+fn axis(state: &JointState, mean: &DVector<f64>, covariance: &DMatrix<f64>) -> Matrix4<f64> {
+    let c = Vector4::from_fn(|k, _| mean[CYLINDER_FORM + BEND[k]]);
+    let moment =
+        c * c.transpose() + Matrix4::from_fn(|i, j| covariance[(CYLINDER_FORM + BEND[i], CYLINDER_FORM + BEND[j])]);
     let [shift, turn] = moved(&state.pose(), state.reference);
     let below = if state.has_cone { &BELOW[..1] } else { &BELOW };
     let mut sum = Matrix4::zeros();
@@ -87,6 +105,16 @@ mod tests {
         const N: usize = 20_000;
         let t = |i: usize| (2 * i + 1) as f64 / N as f64 - 1.0;
         (2 * k + 1) as f64 / N as f64 * (0..N).map(|i| f(t(i)) * legendre(k, t(i))).sum::<f64>()
+    }
+
+    #[test]
+    fn columns_are_those_of_rings_and_bend() {
+        use crate::geometry::surface::Part;
+        use crate::surface_fit::joint::form::terms;
+        let terms = terms(Part::Cylinder);
+        assert!(terms[..RINGS].iter().enumerate().all(|(i, t)| (t.order, t.degree) == (0, i + 1)));
+        let bend: Vec<_> = BEND.iter().map(|&i| (terms[i].order, terms[i].degree, terms[i].sine)).collect();
+        assert_eq!(bend, [(1, 2, false), (1, 2, true), (1, 3, false), (1, 3, true)]);
     }
 
     #[test]
