@@ -32,6 +32,31 @@ def test_against_a_tare_any_floor_gives_a_true_volume(kind: str, tmp_path: Path)
         assert off < 4.0 * (content.volume_std or 0.0)
 
 
+def test_what_a_tare_has_not_seen_may_be_another_stage() -> None:
+    """The upper stage alone is seen; a cone fits it, and the hidden lower one is 2 % of the silo."""
+    empty = vessels.Seen.draw("two_stage", 901).with_feed(None)
+    silo = siloscope.tare(empty.calibration(), [empty.frame])
+    assert silo.floor.map is not None
+    assert silo.floor.map.completed == "cone"
+    nothing = siloscope.measure(empty.again(2).frame, silo, top=empty.top)
+    off = (nothing.ullage or 0.0) - empty.capacity
+    assert off < -0.01 * empty.capacity
+    assert abs(off) < 2.0 * (nothing.ullage_std or 0.0)
+
+
+def test_a_floor_seen_too_little_for_a_volume_leaves_the_ullage() -> None:
+    empty = vessels.Seen.draw("pyramid", 911).with_feed(None)
+    silo = siloscope.tare(empty.calibration(), [empty.frame])
+    low = empty.vessel.bottom.lowest
+    full = empty.with_feed(Feed(low - 0.85 * (low - 0.9)))
+    content = siloscope.measure(full.frame, silo, top=empty.top)
+    assert content.ok
+    assert (content.volume, content.missing) == (None, ("floor",))
+    assert "27 % of the floor was seen" in str(content.message)
+    assert content.ullage == pytest.approx(full.ullage, abs=2.0 * (content.ullage_std or 0.0))
+    assert (content.ullage_std or 1.0) < 0.03 * full.capacity
+
+
 def test_an_empty_frame_that_shows_no_floor_is_no_tare() -> None:
     empty = vessels.Seen.draw("oblique", 1)
     dark = siloscope.Frame(depth=0.0 * empty.frame.depth, camera=empty.camera)

@@ -32,6 +32,12 @@ FITS = 3.0
 ROUGH = 0.015
 """m."""
 
+DEEPEST = 0.98
+"""Quantile of the seen heights that counts as the deepest seen."""
+
+STAGE = 1.0
+"""Standard deviation of what was never seen below it, per metre that the kind continues: another stage may follow."""
+
 Array = NDArray[np.float64]
 
 
@@ -106,7 +112,9 @@ def _completed(z: Array, std: Array, seen: NDArray[np.bool_], derivatives: Array
     if model is None:
         filled, unsure = z, np.where(seen, std, 2.0 * std)
     else:
-        filled, unsure = np.where(seen, z, model), np.where(seen, std, max(FITS * rms, ROUGH))
+        deeper = np.maximum(model - np.quantile(z[seen], DEEPEST), 0.0)
+        filled = np.where(seen, z, model)
+        unsure = np.where(seen, std, np.hypot(max(FITS * rms, ROUGH), STAGE * deeper))
     return FloorMap(radius, filled, unsure, derivatives, fraction, name if fraction < 1.0 else None)
 
 

@@ -63,11 +63,11 @@ def content_of(
     known = request.known
     silo = lengths_for_core(known, request.sheet)
     lacking = _lacking(known, core)
-    free = ullage_of(core, known, silo)
     over = None if known.floor.map is None else volume_over(known.floor.map, core, known, silo)
+    lacking = lacking or _vague(over)
+    free = ullage_of(core, known, silo) if over is None else over.free
     capacity, capacity_from = _capacity(request, silo, lacking, over)
     found = _with_hidden(_with_total(Measured.of(core), over, free if lacking else None), known)
-    free = free if over is None else over.free
     coverage = _coverage(core)
     said = (*request.said, *known.remarks, *quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
     said = spoken_alone(said) if request.located else said
@@ -105,7 +105,7 @@ def content_of(
 
 def _with_total(found: Measured, over: OverFloor | None, free: Ullage | None) -> Measured:
     """The core's answer with the deviations of what is stated: content over a map, or ullage alone."""
-    if over is not None:
+    if over is not None and free is None:
         return replace(found, parts=over.parts, total=over.std)
     return found if free is None else replace(found, total=free.std)
 
@@ -216,6 +216,14 @@ def _lacking(known: Knowledge, core: _core.ContentMeasure) -> tuple[str, ...]:
     volume, bare = core.volume, core.bare
     inside = volume is None or (bare is not None and volume.reach <= bare.farthest)
     return () if inside else ("radius",)
+
+
+def _vague(over: OverFloor | None) -> tuple[str, ...]:
+    """The floor, where so little of it was seen that it gives no volume, while the free space is known."""
+    if over is None:
+        return ()
+    largest = quality.LARGEST_STD * over.capacity
+    return ("floor",) if over.std > largest >= over.free.std else ()
 
 
 def refused(code: str, seen: str, data: Frame | ArrayLike, known: Knowledge) -> Content:

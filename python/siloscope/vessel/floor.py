@@ -138,6 +138,11 @@ def _against_flat(seen: SeenCone | None, steepest: float) -> tuple[Remark, ...]:
 def settles(floor: Floor, missing: tuple[str, ...]) -> str:
     """The sentence that says why there is no volume, and the one thing that would settle it."""
     lacking = ", ".join(missing)
+    if floor.map is not None and "floor" in missing:
+        return (
+            f"Volume unavailable: {100 * floor.map.seen:.0f} % of the floor was seen, too little for a volume; "
+            "add frames of the empty vessel (--empty FRAME) that look at its middle, or give --vessel FILE."
+        )
     if floor.known:
         options = " and ".join(f"--{name.replace('_', '-')}" for name in missing if name in GIVEN)
         remedy = f"give {options}" if options else "calibrate with frames of a lower level"
