@@ -18,6 +18,7 @@ from siloscope.cli import main
 from siloscope.estimation.input_checks import camera_remarks, hole_remarks, range_remarks
 from siloscope.estimation.prior_checks import diameter_off, prior_remarks
 from siloscope.estimation.priors import Priors
+from siloscope.io.camera_sizes import scaled
 from siloscope.io.writers import write_camera, write_png
 from siloscope.reasons import REMARKS
 from siloscope.simulation import Feed, sensor_model
@@ -34,6 +35,13 @@ DEPTH = np.nan_to_num(SCENE.render().measured)
 RAW: NDArray[np.uint16] = np.rint(DEPTH / 0.001).astype(np.uint16)
 DIAMETER = 2.0 * SCENE.silo.radius
 KNOWN: dict[str, Any] = {"sensor": PROFILE, "depth_unit": 0.001}
+
+
+def before_its_own_camera(sensor: str, name: str) -> tuple[Camera, NDArray[np.uint16]]:
+    """A sensor's nominal camera at 160 x 120 pixels, and a scenario before it, mm."""
+    own = scaled(next(c for c in sensors.load(sensor).intrinsics if c.width == 640), (160, 120))
+    scene = replace(scenario(name), camera=own, sensor=replace(sensor_model(sensor), unit=0.001), seed=4)
+    return own, np.rint(np.nan_to_num(scene.render().measured) / 0.001).astype(np.uint16)
 
 
 def codes(estimate: siloscope.Estimate) -> list[tuple[str, str]]:
@@ -70,6 +78,8 @@ def test_a_sensor_that_measures_too_far_is_judged_by_the_true_depth() -> None:
     depth = np.nan_to_num(seen.measured).astype(np.float32)
     assert np.mean(depth > 8.0) > 0.05
     assert range_remarks(depth, sensors.load("orbbec-astra-s")) == ()
+    assert range_remarks(1.3 * depth, sensors.load("orbbec-astra-s"))[0].severity == "warning"
+    assert range_remarks(1.3 * depth, sensors.load("orbbec-astra-s"), 1.0)[0].refuses
     assert range_remarks(4.0 * depth, sensors.load("orbbec-astra-s"))[0].refuses
 
 
@@ -86,7 +96,8 @@ def test_a_unit_that_the_makers_do_not_set_is_a_warning(factor: float) -> None:
 
 
 def test_millimetres_of_a_sensor_that_counts_otherwise_are_a_note() -> None:
-    estimate = siloscope.locate(RAW, CAMERA, sensor="realsense-l515", depth_unit=0.001)
+    own, raw = before_its_own_camera("realsense-l515", "silo2")
+    estimate = siloscope.locate(raw, own, sensor="realsense-l515", depth_unit=0.001)
     assert codes(estimate) == [("millimetre-depth-unit", "note")]
 
 
@@ -112,6 +123,16 @@ def test_colour_intrinsics_are_found_out_by_the_tape() -> None:
     for by in (1.2, 1.4):
         colour = replace(CAMERA, fx=by * CAMERA.fx, fy=by * CAMERA.fy)
         assert not siloscope.locate(RAW, colour, **KNOWN, diameter=DIAMETER).ok
+
+
+@pytest.mark.parametrize(("name", "by"), [("silo2", 0.67), ("silo3", 1.2)])
+def test_a_refused_frame_is_told_of_another_streams_camera(name: str, by: float) -> None:
+    own, raw = before_its_own_camera(PROFILE, name)
+    assert siloscope.locate(raw, own, **KNOWN).quality == ()
+    estimate = siloscope.locate(raw, replace(own, fx=by * own.fx, fy=by * own.fy), **KNOWN)
+    assert not estimate.ok
+    assert codes(estimate) == [("another-streams-camera", "warning")]
+    assert "check the camera file" in str(estimate.message)
 
 
 def test_a_tape_far_off_a_sensor_without_a_profile_is_refused() -> None:

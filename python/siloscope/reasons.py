@@ -167,6 +167,10 @@ INPUT_REMARKS: dict[str, tuple[str, str]] = {
         "the values may be disparities: what is near has large ones",
         "convert them first: depth = focal length · baseline / disparity",
     ),
+    "another-streams-camera": (
+        "the camera may be another stream's: its focal length is none of this sensor's depth images",
+        "check the camera file: the colour camera's intrinsics do not fit depth, nor do those of another resolution",
+    ),
     "focal-lengths-differ": (
         "the camera's two focal lengths differ, as those of square pixels don't",
         "check fx and fy: one of them may be of another stream or resolution",

@@ -30,7 +30,7 @@ MOST_TOO_NEAR = 0.25
 
 LEEWAY = math.sqrt(2.0)
 """Factor by which a sensor may measure beyond its nominal range, with more noise: halfway, as a ratio, to the least
-mistake in a unit, 2. Before its nearest depth it measures nothing."""
+mistake in a unit, 2. It measures nothing before its nearest depth. A unit that is not its own has no leeway."""
 
 SAME_UNIT = 0.01
 """Fraction by which two units of one sensor may differ, as written."""
@@ -70,11 +70,13 @@ def input_remarks(
     if prepared.turn is not None:
         return (*_turned(prepared), *range_remarks(prepared.depth, profile))
     frame = data if isinstance(data, Frame) else Frame(depth=np.asarray(data), depth_unit=depth_unit)
+    unit = _unit(frame, profile, depth_unit)
+    leeway = 1.0 if any(remark.code == "unusual-depth-unit" for remark in unit) else LEEWAY
     return (
         *_kinect_raw(frame.depth),
         *hole_remarks(prepared.depth),
-        *range_remarks(prepared.depth, profile),
-        *_unit(frame, profile, depth_unit),
+        *range_remarks(prepared.depth, profile, leeway),
+        *unit,
         *camera_remarks(prepared.camera),
     )
 
@@ -86,10 +88,10 @@ def _turned(prepared: Prepared) -> Iterator[Remark]:
         yield Remark("axes-found", f"right, down and forward are its {turn}")
 
 
-def range_remarks(depth: NDArray[np.float32], profile: SensorProfile) -> tuple[Remark, ...]:
+def range_remarks(depth: NDArray[np.float32], profile: SensorProfile, leeway: float = LEEWAY) -> tuple[Remark, ...]:
     """What a profile's range says of the depths (H, W), metres, 0 for none, once its own error is taken off.
 
-    A warning where some lie beyond it, a refusal where they do so by more than `LEEWAY`, or lie too near.
+    A warning where some lie beyond it, a refusal where they do so by more than the leeway, or lie too near.
     """
     near, far = profile.range
     step = max(1, round(math.sqrt(depth.size / SAMPLES)))
@@ -102,7 +104,7 @@ def range_remarks(depth: NDArray[np.float32], profile: SensorProfile) -> tuple[R
         return ()
     low, high = np.quantile(seen, (0.05, 0.95))
     figures = f"90 % of it from {low:.2f} to {high:.2f} m, {profile.name} measures {near:g} to {far:g} m"
-    return (Remark("outside-sensor-range", figures, too_near or bool(np.mean(seen > LEEWAY * far) > MOST_BEYOND)),)
+    return (Remark("outside-sensor-range", figures, too_near or bool(np.mean(seen > leeway * far) > MOST_BEYOND)),)
 
 
 def _unit(frame: Frame, profile: SensorProfile, depth_unit: float | None) -> tuple[Remark, ...]:

@@ -9,10 +9,14 @@ from typing import Any
 
 import numpy as np
 
+from siloscope.estimation.input_checks import CONTRADICTION
 from siloscope.estimation.inputs import Prepared, PreparedDepth
 from siloscope.estimation.methods import priors_of
 from siloscope.estimation.prior_checks import diameter_off, gravity_off, prior_remarks, way_remarks
 from siloscope.estimation.settings import Settings
+from siloscope.io.camera_sizes import in_ratio, scaled
+from siloscope.sensors import SensorProfile
+from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate
 from siloscope.types.remark import Remark
 
@@ -64,6 +68,11 @@ def other_readings(run: Run, prepared: Prepared, settings: Settings, config: dic
     if not isinstance(prepared, PreparedDepth) or prepared.turn is not None:
         return
     free = replace(settings, gravity=None, diameter=None, ratios=False, start=None)
+    usual = usual_camera(prepared.camera, settings.profile)
+    if usual is not None and run(replace(prepared, camera=usual), free, config).ok:
+        figures = f"fx {prepared.camera.fx:.5g}, about {usual.fx:.5g} is {settings.profile.name}'s at this size"
+        yield Remark("another-streams-camera", f"{figures}, with which the frame gives an answer")
+        return
     stretch = np.sqrt(1.0 + np.sum(prepared.camera.rays() ** 2, axis=2))
     if _answers(run, prepared, free, config, prepared.depth / stretch):
         yield Remark("ray-length-as-depth", "read as ray lengths, the frame gives an answer")
@@ -73,6 +82,15 @@ def other_readings(run: Run, prepared: Prepared, settings: Settings, config: dic
         inverse = np.where(seen, scale / np.where(seen, prepared.depth, 1.0), 0.0)
         if _answers(run, prepared, free, config, inverse):
             yield Remark("disparity-as-depth", "read as disparities, the frame gives an answer")
+
+
+def usual_camera(camera: Camera, profile: SensorProfile) -> Camera | None:
+    """The profile's camera at an image's size; None where it has none, or one whose devices may be the given one."""
+    size, std = (camera.width, camera.height), profile.nominal_std(camera).f
+    usual = [scaled(one, size) for one in profile.intrinsics if in_ratio((one.width, one.height), size)]
+    if not usual or any(abs(math.log(camera.fx / one.fx)) <= CONTRADICTION * std for one in usual):
+        return None
+    return usual[0]
 
 
 def _answers(run: Run, prepared: PreparedDepth, settings: Settings, config: dict[str, Any], depth: Any) -> bool:

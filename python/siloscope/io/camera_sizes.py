@@ -79,16 +79,17 @@ def choose(name: str, cameras: Sequence[Known], size: Size) -> tuple[Camera, str
     if fitting:
         only = _only(name, fitting, "of this size")
         return (only if isinstance(only, Camera) else only.of_size(size)), None
-    in_ratio = [c for c in cameras if isinstance(c, Intrinsics) and c.size is not None and _in_ratio(c.size, size)]
-    if in_ratio:
-        return _scaled(_only(name, in_ratio, "of this shape"), size)
+    alike = [c for c in cameras if isinstance(c, Intrinsics) and c.size is not None and in_ratio(c.size, size)]
+    if alike:
+        return _scaled(_only(name, alike, "of this shape"), size)
     (first, *others) = cameras
     if isinstance(first, Intrinsics) and first.size is None and not others:
         return _sized(name, first, size)
     raise InputError(_none_fits(name, cameras, size))
 
 
-def _in_ratio(one: Size, other: Size) -> bool:
+def in_ratio(one: Size, other: Size) -> bool:
+    """Whether one size is the other's, scaled."""
     return one[0] * other[1] == one[1] * other[0]
 
 
@@ -112,7 +113,7 @@ def _sized(name: str, known: Intrinsics, size: Size) -> tuple[Camera, str | None
     """Intrinsics without a size: of the frame's, or of a usual one of its shape, in whose middle they lie."""
     if known.is_centred(size, CENTRED):
         return known.of_size(size), "its size is the frame's"
-    usual = [full for full in USUAL_SIZES if _in_ratio(full, size) and known.is_centred(full, CENTRED_IN_USUAL)]
+    usual = [full for full in USUAL_SIZES if in_ratio(full, size) and known.is_centred(full, CENTRED_IN_USUAL)]
     if len(usual) == 1:
         return _scaled(replace(known, size=usual[0]), size)
     raise InputError(
@@ -127,7 +128,7 @@ def _none_fits(name: str, cameras: Sequence[Known], size: Size) -> str:
     if len(cameras) > 1:
         return f"{frame}, the camera file has {sizes}; keep that of the depth stream"
     only = cameras[0]
-    if not isinstance(only, Camera) or not _in_ratio((only.width, only.height), size):
+    if not isinstance(only, Camera) or not in_ratio((only.width, only.height), size):
         return f"{frame} but the camera {sizes}; give the camera of this stream with --camera"
     offer = scaled(only, size)
     numbers = ", ".join(f"{key} {getattr(offer, key):.7g}" for key in ("fx", "fy", "cx", "cy"))
