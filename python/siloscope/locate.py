@@ -109,10 +109,10 @@ def locate(
     run = METHODS.get(method)
     if run is None:
         raise UsageError(f"unknown method '{method}'; known are {', '.join(METHODS)}")
-    profile, sheet = sensors.load(sensor), given(vessel, None, diameter=diameter).sheet
+    profile, known = sensors.load(sensor), given(vessel, None, diameter=diameter)
     settings = Settings.checked(
         profile,
-        diameter=sheet.diameter,
+        diameter=known.sheet.diameter,
         gravity=gravity,
         grid=grid,
         neighbours=neighbours,
@@ -135,5 +135,5 @@ def locate(
     estimate = run(prepared, settings, config)
     if method == "surface":
         estimate, more = second_look.looked_at_again(run, estimate, prepared, settings)
-        found = (*found, *more, *vessel_remarks(estimate, sheet))
+        found = (*found, *more, *vessel_remarks(estimate, known))
     return contradictions.judged(estimate, found, settings.trust)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -16,10 +17,11 @@ from siloscope.cli.outcome import PARTIAL, REFUSED, check_place, print_json, wri
 from siloscope.cli.progress import say, track
 from siloscope.cli.summary import floor_line, headline, pose_table, silo_line, tilt_line
 from siloscope.errors import UsageError
+from siloscope.estimation.vessel_checks import vessel_remarks
 from siloscope.io import FrameSource
 from siloscope.reasons import calibration_remark
 from siloscope.types.calibration import Calibration
-from siloscope.vessel.vessel import load as load_vessel
+from siloscope.vessel.vessel import Vessel
 
 
 def calibrate(
@@ -33,6 +35,9 @@ def calibrate(
     learn: Annotated[
         bool, typer.Option("--learn-floor", help="Learn the floor from a discharge that a refill confirms.")
     ] = False,
+    cylinder: options.Cylinder = None,
+    cone: options.Cone = None,
+    top: options.Top = None,
     vessel: options.VesselFile = None,
     camera: options.CameraFile = None,
     sensor: options.Sensor = None,
@@ -65,7 +70,7 @@ def calibrate(
     """
     check_place(out)
     down = None if gravity is None else options.numbers(gravity, 3, "--gravity")
-    about = None if vessel is None else load_vessel(vessel)
+    about = options.vessel_of(vessel, top, diameter=diameter, cylinder=cylinder, cone=cone, bottom=bottom)
     paths = [*(files or []), *([] if earlier is not None and not files else empty or [])]
     if not paths and not empty:
         raise UsageError("nothing to calibrate from; give FRAMES, or --empty FRAME")
@@ -75,9 +80,9 @@ def calibrate(
             found = siloscope.calibrate(
                 source,
                 sensor=sensor,
-                diameter=diameter if about is None or diameter is not None else about.sheet.diameter,
+                diameter=None if about is None else about.sheet.diameter,
                 gravity=down,
-                bottom=bottom if about is None or bottom is not None else about.sheet.bottom,
+                bottom=None if about is None else _bottom(about),
                 continue_from=earlier,
                 rule=rule,
                 jobs=jobs or os.cpu_count() or 1,
@@ -87,6 +92,10 @@ def calibrate(
     else:
         found = Calibration.load(earlier or "")
     found = _with_floor(found, empty, files if learn else None, reading, {"sensor": sensor, "vessel": about})
+    contradicted = [] if about is None else list(vessel_remarks(found, about))
+    for remark in contradicted:
+        say(f"{remark.code}: {remark.message}")
+    found = replace(found, quality=tuple(dict.fromkeys((*found.quality, *(one.code for one in contradicted)))))
     if _keeps_earlier(found, earlier, out):
         say(f"{out} is left as it was")
     else:
@@ -100,6 +109,11 @@ def calibrate(
     if not found.ok:
         return REFUSED
     return PARTIAL if found.counts["unreadable"] else 0
+
+
+def _bottom(vessel: Vessel) -> str | None:
+    """What a vessel's lengths say of its bottom."""
+    return "flat" if vessel.sheet.cone == 0.0 else vessel.sheet.bottom
 
 
 def _with_floor(

@@ -37,6 +37,10 @@ def locate(
     sensor: options.Sensor = None,
     depth_unit: options.DepthUnit = None,
     diameter: options.Diameter = None,
+    cylinder: options.Cylinder = None,
+    cone: options.Cone = None,
+    bottom: options.Bottom = None,
+    top: options.Top = None,
     vessel: options.VesselFile = None,
     method: Annotated[str | None, typer.Option(help="surface (default) or shape-tensor, the paper's.")] = None,
     out: Annotated[
@@ -75,7 +79,8 @@ def locate(
     """
     box = None if crop is None else options.numbers(crop, 6, "--crop")
     settings: dict[str, Any] = {"method": method, "sensor": sensor, "diameter": diameter, "threads": threads}
-    settings |= {"grid": grid, "neighbours": neighbours, "intrinsics": intrinsics, "trust": trust, "vessel": vessel}
+    settings |= {"grid": grid, "neighbours": neighbours, "intrinsics": intrinsics, "trust": trust}
+    settings["vessel"] = options.vessel_of(vessel, top, cylinder=cylinder, cone=cone, bottom=bottom)
     settings["gravity"] = None if gravity is None else options.numbers(gravity, 3, "--gravity")
     given = {name: value for name, value in settings.items() if value is not None}
 

@@ -29,13 +29,6 @@ from siloscope.wording import counted, with_std
 CalibrationFile = Annotated[
     Path | None, typer.Option("--calibration", metavar="FILE", help="What `calibrate` wrote: pose and geometry.")
 ]
-Cylinder = Annotated[
-    float | None, typer.Option("--cylinder", metavar="M", help="Height of the cylinder by the datasheet.")
-]
-Cone = Annotated[float | None, typer.Option("--cone", metavar="M", help="Height of the cone by the datasheet.")]
-Top = Annotated[
-    float | None, typer.Option("--top", metavar="M", help="Upper edge below the camera (negative: above it).")
-]
 OutletDiameter = Annotated[float, typer.Option(metavar="M", help="Diameter of an outlet pipe below the cone.")]
 OutletLength = Annotated[float, typer.Option(metavar="M", help="Its length below the cone's vertex.")]
 Strapping = Annotated[
@@ -79,10 +72,10 @@ def measure(
     sensor: options.Sensor = None,
     depth_unit: options.DepthUnit = None,
     diameter: options.Diameter = None,
-    cylinder: Cylinder = None,
-    cone: Cone = None,
+    cylinder: options.Cylinder = None,
+    cone: options.Cone = None,
     bottom: options.Bottom = None,
-    top: Top = None,
+    top: options.Top = None,
     vessel: options.VesselFile = None,
     outlet_diameter: OutletDiameter = 0.0,
     outlet_length: OutletLength = 0.0,

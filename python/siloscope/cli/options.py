@@ -12,6 +12,7 @@ import typer
 from siloscope.errors import InputError, UsageError
 from siloscope.io import FrameSource
 from siloscope.types.frame import Frame
+from siloscope.vessel.vessel import Vessel, given
 
 CameraFile = Annotated[
     Path | None, typer.Option("--camera", help="Intrinsics: JSON, TOML, ROS YAML or rs-enumerate-devices text.")
@@ -43,6 +44,13 @@ Axes = Annotated[
     typer.Option("--axes", metavar="X,Y,Z", help="A cloud's axes that are right, down, forward, such as x,-y,-z."),
 ]
 Up = Annotated[str | None, typer.Option("--up", metavar="AXIS", help="A cloud's axis that points upwards: z, -y, ….")]
+Cylinder = Annotated[
+    float | None, typer.Option("--cylinder", metavar="M", help="Height of the cylinder by the datasheet.")
+]
+Cone = Annotated[float | None, typer.Option("--cone", metavar="M", help="Height of the cone by the datasheet.")]
+Top = Annotated[
+    float | None, typer.Option("--top", metavar="M", help="Upper edge below the camera (negative: above it).")
+]
 Bottom = Annotated[
     str | None, typer.Option("--bottom", metavar="KIND", help="cone: the cone seen is the bottom; flat; unknown.")
 ]
@@ -52,6 +60,12 @@ VesselFile = Annotated[
 Stream = Annotated[str | None, typer.Option("--stream", help="Which depth stream of a recording.")]
 Threads = Annotated[int | None, typer.Option("--threads", min=1, max=256, help="Threads to use; 1 unless given.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON document on stdout and nothing else.")]
+
+
+def vessel_of(file: Path | None, top: float | None, **lengths: float | str | None) -> Vessel | None:
+    """A vessel file with single lengths over it; None where nothing of a vessel is given."""
+    known = (file, top, *lengths.values())
+    return None if all(one is None for one in known) else given(file, top, **lengths)
 
 
 def numbers(text: str, count: int, option: str) -> tuple[float, ...]:

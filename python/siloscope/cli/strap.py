@@ -9,7 +9,6 @@ import typer
 from rich.console import Console
 
 import siloscope
-from siloscope.cli import measure as one
 from siloscope.cli import options
 from siloscope.cli.outcome import print_json, writing
 from siloscope.cli.progress import say
@@ -28,10 +27,10 @@ def strap(
     step: Annotated[float, typer.Option(min=0.001, max=10.0, metavar="M", help="Step of the height.")] = 0.01,
     vessel: options.VesselFile = None,
     diameter: options.Diameter = None,
-    cylinder: one.Cylinder = None,
-    cone: one.Cone = None,
+    cylinder: options.Cylinder = None,
+    cone: options.Cone = None,
     bottom: options.Bottom = None,
-    top: one.Top = None,
+    top: options.Top = None,
     as_json: options.AsJson = False,
 ) -> int:
     """Write a strapping table: the volume under a level plane by height, with its deviation.

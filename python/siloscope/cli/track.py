@@ -20,6 +20,8 @@ from siloscope.cli.inputs import opened
 from siloscope.cli.outcome import PARTIAL, REFUSED, print_json, writing
 from siloscope.cli.progress import say
 from siloscope.cli.progress import track as bar
+from siloscope.content.units import Units
+from siloscope.content.units import unit as units_of
 from siloscope.errors import UsageError
 from siloscope.io import FrameSource
 from siloscope.schema import documents
@@ -40,10 +42,10 @@ def track(
     sensor: options.Sensor = None,
     depth_unit: options.DepthUnit = None,
     diameter: options.Diameter = None,
-    cylinder: one.Cylinder = None,
-    cone: one.Cone = None,
+    cylinder: options.Cylinder = None,
+    cone: options.Cone = None,
     bottom: options.Bottom = None,
-    top: one.Top = None,
+    top: options.Top = None,
     vessel: options.VesselFile = None,
     outlet_diameter: one.OutletDiameter = 0.0,
     outlet_length: one.OutletLength = 0.0,
@@ -53,6 +55,7 @@ def track(
     product: one.Product = None,
     test_weight: one.TestWeight = None,
     moisture: one.Moisture = None,
+    unit: one.Unit = None,
     interval: Annotated[
         str | None, typer.Option(metavar="TIME", help="Between frames that have no time: seconds, or 15min, 1h, 1d.")
     ] = None,
@@ -82,7 +85,7 @@ def track(
 
     Exit code 4: no frame has an answer; 5: some have none.
     """
-    settings = one.chosen(locals())
+    settings, units = one.chosen(locals()), units_of(unit)
     settings["strapping"] = None if strapping is None else siloscope.content.Strapping.read(strapping)
     if parquet and out is None:
         raise UsageError("--parquet writes a file; give --out DIR")
@@ -99,10 +102,11 @@ def track(
             progress=lambda frames: bar(frames, "measuring", _count(source)),
             **settings,
         )
-    return _answer(found, out, parquet, lines, as_json)
+    return _answer(found, out, parquet, (lines, as_json, units))
 
 
-def _answer(found: Track, out: Path | None, parquet: bool, lines: bool, as_json: bool) -> int:
+def _answer(found: Track, out: Path | None, parquet: bool, shown: tuple[bool, bool, Units]) -> int:
+    lines, as_json, units = shown
     if out is not None:
         from siloscope.reporting.track_page import write_track
 
@@ -115,7 +119,7 @@ def _answer(found: Track, out: Path | None, parquet: bool, lines: bool, as_json:
         for reading in found.readings:
             print(documents.text(reading.to_dict()))
     else:
-        _print(found)
+        _print(found, units)
     counts = found.counts
     if not counts["ok"]:
         return REFUSED
@@ -140,7 +144,7 @@ def _time(text: str | None) -> float | None:
     return (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
 
 
-def _print(found: Track) -> None:
+def _print(found: Track, units: Units) -> None:
     """The table of readings, the events, and the forecast on stdout."""
     from siloscope.reporting.track_page import moment, when
 
@@ -148,37 +152,47 @@ def _print(found: Track) -> None:
     table = Table(box=None, padding=(0, 2, 0, 0))
     table.add_column("time", style="bold", overflow="fold")
     weighed = any(reading.mass is not None for reading in found.readings)
-    for name in ("volume (m³)", "level (m)", "mass (kg)", f"flow ({'t' if weighed else 'm³'}/h)"):
+    (m3, volume_sign), (_, mass_sign) = units
+    flow = "t" if weighed else volume_sign
+    for name in (f"volume ({volume_sign})", "level (m)", f"mass ({mass_sign})", f"flow ({flow}/h)"):
         table.add_column(name, justify="right", no_wrap=True)
     table.add_column("", overflow="fold")
     for reading in found.readings[-SHOWN:]:
-        table.add_row(*map(escape, _row(reading, weighed)))
+        table.add_row(*map(escape, _row(reading, weighed, units)))
     console.print(table)
     if len(found.readings) > SHOWN:
         say(f"{len(found.readings) - SHOWN} earlier readings not shown; --out, --json and --jsonl have all")
     for event in found.events:
-        mass = "" if event.mass is None else f", {event.mass:.0f} kg"
-        amount = with_std(event.volume, event.volume_std, 1.0, " m³")
+        mass = "" if event.mass is None else f", {_mass(event.mass, units)} {mass_sign}"
+        amount = with_std(event.volume, event.volume_std, 1.0 / m3, f" {volume_sign}")
         begin, end = moment(event.start, event.first), moment(event.end, event.last)
         console.print(f"{event.kind} of {amount}{mass}, {begin} to {end}", markup=False)
     if found.use is not None:
         use = found.use
-        daily = with_std(use.daily, use.daily_std, 1.0, " m³")
+        daily = with_std(use.daily, use.daily_std, 1.0 / m3, f" {volume_sign}")
         until = f"empty by {when(use.empty_by)}, between {when(use.earliest)} and {when(use.latest)}"
         if found.basis == "ullage":
             until = f"as low as ever seen by {when(use.lowest_by)}; the bottom is not known"
         console.print(f"use {daily} a day; {until}", markup=False)
 
 
-def _row(reading: Reading, weighed: bool) -> tuple[str, ...]:
+def _mass(kg: float, units: Units) -> str:
+    """A mass to about a kilogram."""
+    kilograms = units[1][0]
+    return f"{kg / kilograms:.{0 if kilograms <= 1.0 else 2}f}"
+
+
+def _row(reading: Reading, weighed: bool, units: Units) -> tuple[str, ...]:
     from siloscope.reporting.track_page import when
 
     def number(value: float | None, digits: int) -> str:
         return "" if value is None else f"{value:.{digits}f}"
 
-    volume = "" if reading.volume is None else with_std(reading.volume, reading.volume_std, 1.0, "")
+    m3 = units[0][0]
+    volume = "" if reading.volume is None else with_std(reading.volume, reading.volume_std, 1.0 / m3, "")
+    mass = "" if reading.mass is None else _mass(reading.mass, units)
     remark = ", ".join(reading.quality) if reading.status == "ok" else f"{reading.status}: {reading.reason}"
     name = "" if reading.name == reading.reason else reading.name  # of a file that can't be opened there is no more
     time = name if reading.time is None else when(reading.time)
-    flow = reading.mass_flow if weighed else reading.flow
-    return (time, volume, number(reading.level, 3), number(reading.mass, 0), number(flow, 3), remark)
+    flow = reading.mass_flow if weighed else None if reading.flow is None else reading.flow / m3
+    return (time, volume, number(reading.level, 3), mass, number(flow, 3), remark)
