@@ -12,7 +12,7 @@ import pytest
 import siloscope
 import vessels
 from oracle import bottoms as true
-from oracle.feed import Feed
+from oracle.feed import Feed, Tip
 from siloscope.content.over_floor import places
 from siloscope.errors import InputError, UsageError
 from siloscope.vessel import bottoms
@@ -163,6 +163,17 @@ def test_an_obstacle_is_cut_out(tmp_path: Path) -> None:
     assert siloscope.measure(barred.frame, seen.calibration(), vessel=file).has("obstruction")
     assert cut.has("obstruction") == clear.has("obstruction")
     assert cut.volume == pytest.approx(clear.volume or 0.0, abs=2e-3 * seen.capacity)
+
+
+def test_a_crater_whose_ring_is_out_of_view_is_no_sure_volume(tmp_path: Path) -> None:
+    """The flank alone is seen; continued to the wall, it is 13 % of the capacity too much."""
+    empty = vessels.Seen.draw("flat_empty", 931)
+    radius, low = empty.vessel.wall.radius, empty.vessel.bottom.lowest
+    level, slope = low - 0.85 * (low - 0.9), math.tan(math.radians(35.0))
+    seen = empty.with_feed(Feed(level, tip=Tip(0.0, 0.0, level + 0.5 * slope * radius, -slope)))
+    content = siloscope.measure(seen.frame, seen.calibration(), vessel=vessel_file(seen, tmp_path / "vessel.toml"))
+    assert content.reason == "too-little-seen"
+    assert "deviation" in str(content.message)
 
 
 @pytest.mark.parametrize("seed", [1, 2])

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from siloscope import _core
 from siloscope.content import quality
 from siloscope.content.alone import meaning, spoken_alone
+from siloscope.content.beyond import break_std, widened
 from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density
 from siloscope.content.fitting import lengths_for_core
@@ -64,11 +65,13 @@ def content_of(
     silo = lengths_for_core(known, request.sheet)
     lacking = _lacking(known, core)
     over = None if known.floor.map is None else volume_over(known.floor.map, core, known, silo)
-    lacking = lacking or _vague(over)
     free = ullage_of(core, known, silo) if over is None else over.free
-    capacity, capacity_from = _capacity(request, silo, lacking, over)
-    found = _with_hidden(_with_total(Measured.of(core), over, free if lacking else None), known)
     coverage = _coverage(core)
+    more = 0.0 if core.surface is None else break_std(SurfaceMap(core.surface, 0.0, silo[0]), coverage)
+    found, over, free = widened(Measured.of(core), over, free, more)
+    lacking = lacking or _vague(over)
+    capacity, capacity_from = _capacity(request, silo, lacking, over)
+    found = _with_hidden(_with_total(found, over, free if lacking else None), known)
     said = (*request.said, *known.remarks, *quality.remarks(found, coverage, capacity, math.pi * silo[0] ** 2))
     said = spoken_alone(said) if request.located else said
     frame: dict[str, Any] = {
