@@ -7,7 +7,8 @@ Vessels, feeds and exact volumes are the tests' independent oracle. Known is
 - alone: one frame with its camera and profile;
 - nothing: the calibration of an earlier discharge, which was told nothing of the bottom;
 - told: pose and radius with a deviation of 0.5 mm and mrad, and the vessel file of the maker's lengths;
-- tare: the same with one frame of the empty vessel in place of the file.
+- tare: the same with one frame of the empty vessel in place of the file;
+- learned: the same with a discharge, a refill and a discharge in place of the file.
 
 With `--fused`, told and tare rest on the calibration of the earlier discharge as well. With `--drawn`, walls are out of
 round and in courses, and cameras are off what is told of them, as they are drawn from their priors; the vessel file
@@ -50,9 +51,12 @@ CLEAR = 0.45
 EARLIER = (0.75, 0.6, 0.45, 0.3, 0.15, 0.05)
 """Levels of the earlier discharge that is calibrated from."""
 
+REFILLED = (0.03, 0.0, 0.7, 0.35, 0.03, 0.0)
+"""Levels of the sequence that the floor is learned from."""
+
 SENSORS = {"astra-s": ASTRA_S, "d455": D455}
 
-KNOWN = ("alone", "nothing", "told", "tare")
+KNOWN = ("alone", "nothing", "told", "tare", "learned")
 
 FINENESS = 60
 """Of the quadrature of true volumes, which is then right to 0.01 % of the capacity."""
@@ -144,7 +148,8 @@ def answers(case: Case) -> list[Answer]:
         return []
     earlier = calibrated(empty) if case.fused or "nothing" in case.known else None
     silo = earlier if case.fused and earlier is not None else empty.calibration()
-    tared = siloscope.tare(silo, [empty.again(1).frame]) if "tare" in case.known and silo.ok else silo
+    tared = _tared(silo, empty) if "tare" in case.known and silo.ok else silo
+    refilled = siloscope.learn_floor(silo, _refilled(empty)) if "learned" in case.known and silo.ok else silo
     capacity = volumes.ullage(empty.vessel, None, FINENESS)
     found = []
     with tempfile.TemporaryDirectory() as folder:
@@ -155,10 +160,11 @@ def answers(case: Case) -> list[Answer]:
                 "nothing": partial(siloscope.measure, seen.frame, earlier, top=seen.top),
                 "told": partial(siloscope.measure, seen.frame, silo, vessel=file),
                 "tare": partial(siloscope.measure, seen.frame, tared, top=seen.top),
+                "learned": partial(siloscope.measure, seen.frame, refilled, top=seen.top),
             }
             truth = Truth(capacity, volumes.ullage(seen.vessel, seen.scene.feed, FINENESS))
             for known in case.known:
-                used = {"alone": None, "nothing": earlier, "told": silo, "tare": tared}[known]
+                used = {"alone": None, "nothing": earlier, "told": silo, "tare": tared, "learned": refilled}[known]
                 if used is not None and not used.ok:
                     reason = f"calibration: {used.reason}"
                     found.append(Answer(known, case.bottom, case.seed, name, reason, None, None, 0.0, None, 0.0))
@@ -194,6 +200,20 @@ def calibrated(empty: vessels.Seen) -> siloscope.Calibration:
         if float(made.air(*empty.scene.pose.origin[:, None])[0]) > CLEAR:
             frames.append(empty.with_feed(made).again(number + 300).frame)
     return siloscope.calibrate(frames, sensor=empty.profile)
+
+
+def _tared(silo: siloscope.Calibration, empty: vessels.Seen) -> siloscope.Calibration:
+    """With one frame of the empty vessel; as it was where that shows too little of the floor."""
+    try:
+        return siloscope.tare(silo, [empty.again(1).frame])
+    except siloscope.InputError:
+        return silo
+
+
+def _refilled(empty: vessels.Seen) -> list[siloscope.Frame]:
+    low, draw = empty.vessel.bottom.lowest, np.random.default_rng((empty.scene.device, 82))
+    made = [Feed(low - level * (low - 0.9), waves=_waves(draw)) if level else None for level in REFILLED]
+    return [empty.with_feed(feed).again(number + 400).frame for number, feed in enumerate(made)]
 
 
 def feeds(empty: vessels.Seen, seed: int) -> Iterator[tuple[str, vessels.Seen]]:
