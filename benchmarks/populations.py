@@ -112,8 +112,7 @@ def calibrated(folder: Path, width: int, modes: str, moved: bool, item: tuple[st
     for mode in modes:
         camera = camera_of(last, mode)
         frames = [Frame(depth=s.depth.astype(np.float32) * 1e-3, camera=camera) for s in samples]
-        known = {name: value for name, value in knowledge(last, mode).items() if name != "intrinsics"}
-        answer = siloscope.calibrate(frames, **known)
+        answer = siloscope.calibrate(frames, **knowledge(last, mode))
         found.append(Judged(kind, seed, mode, judge(answer.to_dict(), last), moves=len(answer.moves), moved=moved))
     return found
 

@@ -37,7 +37,7 @@ def located(scene: Scene, sensor: str | None = PROFILE, diameter: float | None =
 
 
 locate = partial(siloscope.locate, vessels="coaxial")
-"""As frames are located that are fused: the laws of this file are those of the warm start in that model."""
+"""In the model of a coaxial vessel: the laws of this file are those of its warm start."""
 
 
 def emptying(name: str, feed: str, steps: int = 7, defects: Defects | None = None) -> tuple[Scene, ...]:
@@ -60,7 +60,7 @@ def gap(one: Estimate, other: Estimate) -> float:
     assert one.evidence is not None
     assert other.evidence is not None
     assert one.covariance is not None
-    pose = np.abs(one.evidence.parameters - other.evidence.parameters)[:4] / np.sqrt(np.diag(one.covariance))
+    pose = np.abs(one.evidence.state - other.evidence.state)[:4] / np.sqrt(np.diag(one.covariance))
     return float(pose.max())
 
 
@@ -182,7 +182,7 @@ def test_a_calibration_says_what_its_frames_say_from_nothing(monkeypatch: pytest
         sys.modules["siloscope.fusion.schedule"], "FULL_RES_FRAMES", len(sequence())
     )  # a quarter says less
     distinct = {frame.digest: frame for frame in sequence()}.values()  # a frame given twice counts once
-    each = [locate(frame, sensor=PROFILE) for frame in distinct]
+    each = [siloscope.locate(frame, sensor=PROFILE) for frame in distinct]  # in the model that frames are fused in
     alone, found = calibrate(each), fused(sequence())
     assert [record.status for record in found.frames] == [record.status for record in alone.frames]
     assert [move.index for move in found.moves] == [move.index for move in alone.moves] == [19]

@@ -28,7 +28,6 @@ from siloscope.reproduction.evaluation.tables import Table, number, shown
 from siloscope.reproduction.evaluation.targets import CHAPTERS, NAMES, wanted
 from siloscope.reproduction.evaluation.verdicts import judged, listed
 from siloscope.reproduction.jobs import Job, key, program
-from siloscope.reproduction.packing import packed, unpacked
 from siloscope.reproduction.running import run
 from siloscope.reproduction.sensor_trials import ACCELEROMETER_STD, SensorTrial, accelerometer, ideal_cloud
 from siloscope.reproduction.solvers import ALL, SOLVERS
@@ -175,25 +174,7 @@ def test_evidence_survives_storing(trial: Trial, observation: Observation) -> No
     fresh = SOLVERS["surface"](trial.scene.render(), trial.profile)
     kept = observation.answers["surface"].evidence
     assert fresh.evidence is not None
-    assert kept is not None
-    for name, value in vars(fresh.evidence).items():
-        np.testing.assert_array_equal(getattr(kept, name), value)
-
-
-@dataclass(frozen=True, eq=False)
-class Arrays:
-    numbers: np.ndarray
-    flags: np.ndarray
-    scale: float
-
-
-def test_packing_loses_nothing() -> None:
-    values = Arrays(np.array([[np.nan, 1e-300], [np.pi, -np.inf]]).T, np.array([True, False]), 0.1)
-    back = unpacked(Arrays, json.loads(json.dumps(packed(values))))
-    np.testing.assert_array_equal(back.numbers, values.numbers)
-    np.testing.assert_array_equal(back.flags, values.flags)
-    assert back.flags.dtype == bool
-    assert back.scale == values.scale
+    assert kept == fresh.evidence
 
 
 def test_one_index_for_several_poses_gives_the_same_distances() -> None:

@@ -157,7 +157,7 @@ def test_equations_are_made_near_the_answer() -> None:
     answers = [found for scene in scenes if (found := fit(scene, None)).ok]
     assert len(answers) > 12
     steps = np.array([
-        [getattr(found.pose, name) for name in POSE] - found.evidence.linearization_point[:4] for found in answers
+        [getattr(found.pose, name) for name in POSE] - found.evidence.state[:4] for found in answers
     ])  # fmt: skip
     near = (np.abs(steps) < [0.003, 0.003, 0.01, 0.01]).all(axis=1)
     assert near.mean() > 0.85

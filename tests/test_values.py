@@ -131,7 +131,7 @@ def test_a_pickle_leaves_out_what_can_be_worked_out_again() -> None:
 
 def test_an_estimate_without_details_is_small() -> None:
     sizes = [len(pickle.dumps(replace(estimate, details=None))) for estimate in estimates()]
-    assert max(sizes) <= 10_000, sizes
+    assert max(sizes) <= 20_000, sizes  # of which what it says for fusing takes 17 kB: 1800 numbers and 64 rays
 
 
 def test_details_keep_labels_and_start_through_a_pickle() -> None:

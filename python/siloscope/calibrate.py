@@ -29,7 +29,8 @@ from siloscope.types.calibration import Calibration
 from siloscope.types.camera import Camera
 from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
-from siloscope.vessel.floor import calibrated_floor
+from siloscope.types.intrinsics import IntrinsicsStd
+from siloscope.vessel.floor import with_floor
 from siloscope.wording import counted
 
 RULES = ("information", "mean-of-last-10")
@@ -48,6 +49,7 @@ def calibrate(
     diameter: float | None = None,
     gravity: ArrayLike | None = None,
     bottom: str | None = None,
+    intrinsics: str | IntrinsicsStd | None = None,
     continue_from: Calibration | Pathlike | None = None,
     rule: str = "information",
     jobs: int = 1,
@@ -69,6 +71,8 @@ def calibrate(
     bottom : str, optional
         "cone": the conical surface of these frames is the vessel's bottom; "flat"; "unknown". Without it a surface
         counts as the bottom only if it is steeper than feed can lie.
+    intrinsics : {"exact", "calibrated", "nominal"} or IntrinsicsStd, optional
+        How exactly the camera's intrinsics are known, as for `locate`.
     continue_from : Calibration or path, optional
         An earlier calibration of the same camera and silo; its frames come before these. A frame that it has counted
         is known by its measurements and does not count again.
@@ -99,7 +103,7 @@ def calibrate(
         raise UsageError(f"jobs {jobs} is not between 1 and 256; give the number of frames to locate at a time")
     start = time.perf_counter()
     before = Calibration.load(continue_from) if isinstance(continue_from, str | PathLike) else continue_from
-    settings = settings_of(before, sensor=sensor, diameter=diameter, gravity=gravity)
+    settings = settings_of(before, sensor=sensor, diameter=diameter, gravity=gravity, intrinsics=intrinsics)
     source = given_frames(frames, camera, depth_unit)
     one = FrameLocator(partial(locate, trust=tuple(sorted(trusted(trust)))), camera, depth_unit, settings)
     ahead = 0 if jobs == 1 else 2 * jobs
@@ -113,11 +117,11 @@ def calibrate(
     brought = {} if before is not None else brought_settings(answers)
     config = {**settings.described(), **{k: v for k, v in brought.items() if k not in told}}
     config["camera"] = common_camera(before, answers)
-    found = calibration_of(History.of(before).extended(answers, lost), rule, config)
+    found = calibration_of(History.of(before, rule).extended(answers, lost), rule, config)
     times = {"frames": 1e3 * (read_until - start), "fusion": 1e3 * (time.perf_counter() - read_until)}
     found = _with_what_inputs_say(found, [answer.estimate for answer in answers if answer.estimate is not None])
     quality = (*found.quality, *uncounted.remarks)
-    return replace(found, timing_ms=times, quality=quality, floor=calibrated_floor(found, bottom, before))
+    return with_floor(replace(found, timing_ms=times, quality=quality), bottom, before)
 
 
 def _with_what_inputs_say(found: Calibration, estimates: list[Estimate]) -> Calibration:

@@ -29,6 +29,7 @@ from siloscope.types.calibration import Calibration
 from siloscope.types.camera import Camera
 from siloscope.types.content import Content
 from siloscope.types.frame import Frame
+from siloscope.types.intrinsics import IntrinsicsStd
 from siloscope.types.pose import SiloPose
 from siloscope.vessel.floor import STEEPEST_REPOSE
 from siloscope.vessel.vessel import Vessel, given
@@ -58,13 +59,13 @@ def measure(
     pose: SiloPose | None = None,
     pose_std: tuple[float, float] | None = None,
     mask: ArrayLike | None = None,
+    intrinsics: str | IntrinsicsStd | None = None,
     previous: Content | None = None,
     trust: str | Sequence[str] = (),
 ) -> Content:
     """Measure what is in the silo: surface, level, volume, fill and mass, each with its standard deviation.
 
-    The surface is the most probable one under the returns that lie over the silo's floor (`docs/content.md` has the
-    formulas); the volume is the integral between it and the floor.
+    The surface is the most probable one under the returns over the floor; `docs/content.md` has the formulas.
 
     Parameters
     ----------
@@ -84,8 +85,7 @@ def measure(
         "cone": the conical surface seen, where `cone` is not given; "flat", or "unknown". Without it a conical surface
         counts as the bottom only if it is steeper than feed can lie.
     top : float, optional
-        z of the silo's upper edge below the camera, m (negative above it), up to which it can be filled. From
-        `cylinder` where not given, else the camera's own height.
+        z of the silo's upper edge below the camera, m (negative above it); from `cylinder`, else the camera's height.
     vessel : Vessel or path, optional
         A vessel file (`siloscope.vessel.vessel.load`), over which single lengths win.
     outlet_diameter, outlet_length : float
@@ -93,20 +93,19 @@ def measure(
     strapping : Strapping or path, optional
         Strapping table: capacity, and the volume below the mean level.
     density, density_std : float, optional
-        Bulk density and its standard deviation, kg/m³.
+        Bulk density and its deviation, kg/m³.
     product : str, path or Density, optional
         A product of the table (`siloscope.content.products()`) or of a TOML file.
     test_weight : str, optional
         Weighed test weight: "60" lb/bu, or "77.2kg/hl". It takes the place of the product's density.
     moisture : float, optional
-        Of the feed, as a fraction of its wet mass: the answer then has the dry matter too.
+        Of the feed, as a fraction of its wet mass: adds the dry matter.
     pose : SiloPose, optional
         The camera's pose where no calibration tells it, for a bin that is not round: its outline is in the vessel file.
     pose_std : (float, float), optional
-        Standard deviations of a given pose's angles, rad, and of its place, m; `siloscope.content.outlined.POSE_STD`
-        where not given.
-    mask : array of bool, optional
-        True where the silo is.
+        Deviations of a given pose's angles, rad, and of its place, m; else `siloscope.content.outlined.POSE_STD`.
+    mask, intrinsics : optional
+        As for `siloscope.locate`; `intrinsics` where there is no calibration.
     previous : Content, optional
         The reading of the frame before, to see whether the content is moving.
 
@@ -134,9 +133,8 @@ def measure(
         placed = PlacedPose.of(pose, pose_std, calibration)
         return replace(outlined(prepared, placed, about, profile, chosen, source_of(data)), moisture=moisture)
     if calibration is None:
-        vessels = "coaxial" if sheet.bottom == "cone" or sheet.cone else "any"  # a cone that is told is not asked for
         estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask,
-                          vessels=vessels, trust=trust)  # fmt: skip
+                          intrinsics=intrinsics, trust=trust)  # fmt: skip
         silo = calibrate([estimate], sensor=profile, diameter=sheet.diameter) if estimate.ok else None
         if silo is None or not silo.ok:
             return unlocated(data, estimate if silo is None else silo, source_of(data))

@@ -11,6 +11,7 @@ mod content;
 mod convert;
 mod depth;
 mod files;
+mod fusion;
 mod inputs;
 mod outcome;
 mod scene;
@@ -28,6 +29,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     depth::register(m)?;
     content::register(m)?;
     files::register(m)?;
+    fusion::register(m)?;
     outcome::register(m)?;
     scene::register(m)?;
     surface::register(m)?;

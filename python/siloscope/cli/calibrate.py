@@ -45,6 +45,7 @@ def calibrate(
     diameter: options.Diameter = None,
     gravity: options.Gravity = None,
     bottom: options.Bottom = None,
+    intrinsics: options.Intrinsics = None,
     earlier: Annotated[
         Path | None, typer.Option("--continue", metavar="FILE", help="An earlier calibration to go on with.")
     ] = None,
@@ -83,6 +84,7 @@ def calibrate(
                 diameter=None if about is None else about.sheet.diameter,
                 gravity=down,
                 bottom=None if about is None else _bottom(about),
+                intrinsics=intrinsics,
                 continue_from=earlier,
                 rule=rule,
                 jobs=jobs or os.cpu_count() or 1,

@@ -39,6 +39,7 @@ def live(
     depth_unit: options.DepthUnit = None,
     diameter: options.Diameter = None,
     gravity: options.Gravity = None,
+    intrinsics: options.Intrinsics = None,
     stream: options.Stream = None,
     trust: options.Trust = None,
     count: Annotated[int | None, typer.Option("--frames", min=1, help="Stop after so many frames.")] = None,
@@ -54,6 +55,7 @@ def live(
     Shows pose, uncertainty and what is seen, and which way to turn the camera to see more wall.
     """
     settings: dict[str, Any] = {"sensor": sensor_profile, "diameter": diameter, "threads": threads, "trust": trust}
+    settings["intrinsics"] = intrinsics
     settings["gravity"] = None if gravity is None else options.numbers(gravity, 3, "--gravity")
     given = {name: value for name, value in settings.items() if value is not None}
     shown, problems = 0, list[str]()

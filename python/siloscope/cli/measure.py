@@ -85,6 +85,7 @@ def measure(
     product: Product = None,
     test_weight: TestWeight = None,
     moisture: Moisture = None,
+    intrinsics: options.Intrinsics = None,
     unit: Unit = None,
     pose: Annotated[
         str | None, typer.Option(metavar="R_X,R_Y,T_X,T_Y", help="Pose (rad, m) in a bin whose outline --vessel has.")
@@ -113,7 +114,7 @@ def measure(
     a line each; of a recording its first frame counts, or the one of --frame, or --all; `track` tells their story.
     Exit code 4: the frame was read well, but gives no trustworthy answer; the JSON says why. 5: some of several do.
     """
-    settings, units = chosen(locals()), units_of(unit)
+    settings, units = {**chosen(locals()), "intrinsics": intrinsics}, units_of(unit)
     place = {"camera": camera, "depth_unit": depth_unit, "stream": stream, "axes": axes, "up": up}
     silo = None if calibration is None else siloscope.Calibration.load(calibration)
     if pose is not None:

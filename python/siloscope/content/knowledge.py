@@ -21,7 +21,7 @@ from siloscope.types.pose import SiloPose
 from siloscope.types.remark import Remark
 from siloscope.types.vessel import Lengths, SiloGeometry
 from siloscope.vessel.datasheet import Datasheet
-from siloscope.vessel.floor import CONTRADICTION_STD, STEEPEST_REPOSE, floor_of
+from siloscope.vessel.floor import CONTRADICTION_STD, STEEPEST_REPOSE, floor_of, has_seen_cone, with_cone
 from siloscope.vessel.limits import LENGTH_STD
 from siloscope.vessel.vessel import Vessel
 
@@ -97,8 +97,7 @@ def know(
     floor, remarks = floor_of(calibration, sheet, steepest)
     if floor.kind == "flat":
         sheet = replace(sheet, bottom="flat", cone=None)
-    if floor.kind != "cone" or floor.seen is None:
-        calibration = _without_cone(calibration)
+    calibration = with_cone(calibration) if has_seen_cone(floor) else _without_cone(calibration)
     lengths = _cone_alone(calibration, _joint(calibration, complete(calibration.silo, sheet, top), sheet))
     floor = _placed(floor, sheet, lengths.geometry)
     covariance = _covariance(calibration, lengths)

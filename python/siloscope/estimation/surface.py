@@ -110,7 +110,7 @@ def _estimate(
         config=config or {},
         timing_ms=timing_ms(fit.stages),
         extra=extra,
-        evidence=_factor(fit, priors),
+        evidence=FrameFactor.of(fit.factor),
         details=SurfaceDetails(fit.points, fit.residuals, fit.warm_start, labels),
     )
 
@@ -158,23 +158,3 @@ def _gravity_check(pose: SiloPose, gravity: NDArray[np.float64]) -> dict[str, fl
     down = np.asarray(gravity, float) / np.linalg.norm(gravity)
     angle = float(np.arccos(np.clip(abs(down @ pose.axis_direction), 0.0, 1.0)))  # both are lines
     return {"r_x": from_gravity.r_x, "r_y": from_gravity.r_y, "angle_to_axis": angle}
-
-
-def _factor(fit: _core.SurfaceFit, priors: Priors) -> FrameFactor:
-    """The frame's factor with its priors beside it; ovality is estimated wherever it has a prior."""
-    factor, free = fit.factor, fit.free
-    prior = factor.prior_information
-    free[OVALITY] |= prior[OVALITY] > 0.0
-    return FrameFactor(
-        parameters=fit.parameters + factor.step,
-        information=factor.information,
-        gradient=factor.gradient,
-        scatter=factor.scatter,
-        noise=factor.noise,
-        free=free,
-        prior_mean=priors.mean,
-        prior_information=prior,
-        scale_std=0.0 if free[DEPTH_BIAS][1] else priors.profile.bias_std[1],
-        linearization_point=factor.linearization_point,
-        rays=factor.rays,
-    )

@@ -5,16 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from siloscope.errors import UsageError
-from siloscope.fusion.change_point import find_moves, may_have_moved
-from siloscope.fusion.factors import FrameFactors
+from siloscope import _core
+from siloscope.errors import InputError, UsageError
 from siloscope.fusion.located_frame import LocatedFrame
-from siloscope.fusion.relinearize import at_bias, bias_is_free, relinearized
-from siloscope.fusion.solve import Fused, fuse
-from siloscope.parameters import PARAMETERS
-from siloscope.types.calibration import Calibration, FrameRecord
+from siloscope.types.calibration import Calibration, Evidence, FrameRecord
 from siloscope.types.frame_factor import FrameFactor, SummedFactor
 from siloscope.types.move import Move
 
@@ -29,9 +23,16 @@ class History:
     moves: tuple[Move, ...] = ()
 
     @classmethod
-    def of(cls, before: Calibration | None) -> History:
+    def of(cls, before: Calibration | None, rule: str) -> History:
+        """Of the calibration to continue; raises `InputError` where that lacks what is fused."""
         if before is None:
             return cls()
+        lacking = not before.evidence.frames and before.evidence.earlier is None
+        if lacking and before.ok and before.rule == rule == "information":
+            raise InputError(
+                "the calibration to continue was written by an earlier version of siloscope, without the evidence that "
+                "this one fuses; calibrate all frames anew"
+            )
         return cls(before.frames, before.evidence.frames, before.evidence.earlier, before.moves)
 
     def extended(self, answers: list[LocatedFrame], lost: Iterable[str]) -> History:
@@ -56,43 +57,51 @@ def _record(number: int, answer: LocatedFrame) -> FrameRecord:
     return replace(plain, pose=answer.estimate.pose, cone_reach=answer.cone_reach or answer.estimate.cone_reach)
 
 
-def since_the_last_move(history: History) -> tuple[History, FrameFactors, Fused]:
-    """The factors since the last move of the camera, and their common answer.
+MAX_KEPT_FACTORS = 100
+"""Number of frames that keep their own factor in a calibration; older ones are added up."""
 
-    If the bias is unknown, a move shows clearly only with equations at the right bias, and the bias follows only from
-    frames without a move between them. So moves are searched twice if there may be one.
+
+@dataclass(frozen=True)
+class Fused:
+    """What the frames since the last move of the camera say together."""
+
+    history: History
+    fusion: _core.Fusion
+
+    @property
+    def disagreeing(self) -> float:
+        """Fraction of the frames, 0 to 1, that count less than half."""
+        weights = self.fusion.weights
+        return sum(weight < 0.5 for weight in weights) / len(weights) if weights else 0.0
+
+    @property
+    def kept(self) -> Evidence:
+        """The newest frames' evidence; older frames added up with the weights they have now."""
+        older = self.fusion.older
+        return Evidence(self.history.evidence[-MAX_KEPT_FACTORS:], None if older is None else SummedFactor.of(older))
+
+
+def since_the_last_move(history: History) -> Fused | None:
+    """The frames since the last move of the camera, fused; None where they tell no place.
+
+    Raises
+    ------
+    UsageError
+        For frames that were located with different sensor profiles.
     """
-    factors = _factors(history)
-    found = _fused_since(history, factors, find_moves(factors, history.earlier))
-    if bias_is_free(factors) and (found[0].moves != history.moves or may_have_moved(found[2])):
-        about_bias = at_bias(factors, found[2].parameters)
-        found = _fused_since(history, factors, find_moves(about_bias, history.earlier))
-    return found
+    factors = [factor for _, factor in history.evidence]
+    _check_common([*factors, *([] if history.earlier is None else [history.earlier.factor])])
+    fusion = _core.fuse_frames(factors, history.earlier, MAX_KEPT_FACTORS)
+    if fusion is None:
+        return None
+    if not fusion.moves:
+        return Fused(history, fusion)
+    told = tuple(Move(history.evidence[m.index][0], m.turn, m.shift, m.significance) for m in fusion.moves)
+    evidence = history.evidence[fusion.first :]
+    return Fused(replace(history, evidence=evidence, earlier=None, moves=(*history.moves, *told)), fusion)
 
 
-def _fused_since(history: History, factors: FrameFactors, moves: list[Move]) -> tuple[History, FrameFactors, Fused]:
-    """The evidence since the last of these moves, fused; `factors` is that of all."""
-    if moves:
-        first = moves[-1].index
-        told = tuple(replace(move, index=history.evidence[move.index][0]) for move in moves)
-        history = replace(history, evidence=history.evidence[first:], earlier=None, moves=(*history.moves, *told))
-        factors = _factors(history)
-    factors = relinearized(factors, history.earlier)
-    return history, factors, fuse(factors, history.earlier)
-
-
-def _factors(history: History) -> FrameFactors:
-    factors = FrameFactors([evidence for _, evidence in history.evidence])
-    _check_common(factors)
-    return factors
-
-
-def _check_common(factors: FrameFactors) -> None:
-    """Parameters that a frame does not estimate must have the same given value in all: one sensor profile.
-
-    The frames' own values may differ: a bias that the diameter tells is left where it is in a frame without cylinder.
-    """
-    for k in range(7, len(PARAMETERS)):
-        told = factors.expected[~factors.free[:, k], k]
-        if len(told) and np.ptp(np.nan_to_num(told)) > 1e-12:
-            raise UsageError("the estimates were made with different sensor profiles; locate all frames with one")
+def _check_common(factors: list[FrameFactor]) -> None:
+    """One sensor profile for all: what is expected of the depth bias, and how firmly."""
+    if len({(factor.bias, factor.bias_std) for factor in factors}) > 1:
+        raise UsageError("the estimates were made with different sensor profiles; locate all frames with one")

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from siloscope import _core
 from siloscope.errors import UsageError
-from siloscope.fusion.factors import FrameFactors
-from siloscope.fusion.history import History, since_the_last_move
-from siloscope.fusion.solve import Fused, summed
+from siloscope.fusion.history import MAX_KEPT_FACTORS, Fused, History, since_the_last_move
 from siloscope.parameters import PARAMETERS
 from siloscope.reasons import CALIBRATION_REFUSALS, sentence
 from siloscope.types.calibration import Calibration, Evidence, FrameRecord
@@ -20,8 +20,11 @@ from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry, geometry_of
 
-MAX_KEPT_FACTORS = 300
-"""Number of frames that keep their own factor in a calibration; older ones are added up."""
+RADIUS, SLOPE = 12, 49
+"""Where the state has the radius and the cone's slope, with its intercept behind it."""
+
+COAXIAL = ("coaxial-cone", "cone-alone")
+"""Models whose cone is the axis' own."""
 
 MAX_DIRECTION_STD = 0.02
 """Largest standard deviation of the axis' direction that still is an answer, rad."""
@@ -43,45 +46,49 @@ def calibration_of(history: History, rule: str, config: dict[str, Any]) -> Calib
         raise UsageError(
             "fusing by information needs estimates of method surface; give those, or choose the rule mean-of-last-10"
         )
-    return _by_information(*since_the_last_move(history), config)
+    fused = since_the_last_move(history)
+    if fused is None:
+        return _refused("poorly-determined", history, rule, config)
+    history = replace(fused.history, records=_judged(fused))
+    alone = fused.history.earlier is None and fused.disagreeing > 0.5
+    if alone or not _determined(fused.fusion):
+        disagree = fused.fusion.excess > 1.0 or fused.disagreeing > MANY_FRACTION
+        return _refused("frames-disagree" if disagree else "poorly-determined", history, rule, config)
+    return _answer(history, fused, config)
 
 
-def _by_information(history: History, factors: FrameFactors, fused: Fused, config: dict[str, Any]) -> Calibration:
-    history = replace(history, records=_judged(history, fused))
-    if not _determined(fused):
-        disagree = fused.excess > 1.0 or fused.disagreeing > MANY_FRACTION
-        return _refused("frames-disagree" if disagree else "poorly-determined", history, "information", config)
-    return _answer(history, factors, fused, config)
-
-
-def _answer(history: History, factors: FrameFactors, fused: Fused, config: dict[str, Any]) -> Calibration:
-    values = fused.parameters
+def _answer(history: History, fused: Fused, config: dict[str, Any]) -> Calibration:
+    fusion = fused.fusion
+    values, covariance = fusion.parameters, fusion.covariance
     radius, slope, intercept = (None if not np.isfinite(v) else float(v) for v in values[4:7])
-    cone = None if slope is None or intercept is None else (slope, intercept)
-    silo, silo_std = geometry_of(radius, cone, fused.covariance)
+    cone = None if slope is None or intercept is None or not fusion.hopper else (slope, intercept)
+    silo, silo_std = geometry_of(radius, cone, covariance)
     return Calibration(
         "ok",
         pose=SiloPose(*(float(v) for v in values[:4])),
-        covariance=fused.covariance[:4, :4].copy(),
+        covariance=covariance[:4, :4].copy(),
         silo=silo,
         silo_std=silo_std,
         parameters=values,
-        parameter_covariance=fused.covariance,
-        excess=fused.excess,
-        scale_std=fused.scale_std,
+        parameter_covariance=covariance,
+        excess=fusion.excess,
+        scale_std=fusion.scale_std,
         moves=history.moves,
         frames=history.records,
         quality=_quality(history, fused),
         config=config,
-        evidence=_kept(history, factors, fused),
+        evidence=fused.kept,
+        models=tuple(fusion.models),
+        covariance_relative=fusion.covariance_relative[:4, :4].copy(),
     )
 
 
-def _judged(history: History, fused: Fused) -> tuple[FrameRecord, ...]:
+def _judged(fused: Fused) -> tuple[FrameRecord, ...]:
     """Records with the verdict of the fusion."""
+    history, fusion = fused.history, fused.fusion
     verdict = {
-        number: (float(weight), float(deviation))
-        for (number, _), weight, deviation in zip(history.evidence, fused.weights, fused.deviations, strict=True)
+        number: (weight, deviation)
+        for (number, _), weight, deviation in zip(history.evidence, fusion.weights, fusion.deviations, strict=True)
     }
     first = history.moves[-1].index if history.moves else 0
 
@@ -97,34 +104,27 @@ def _judged(history: History, fused: Fused) -> tuple[FrameRecord, ...]:
 
 
 def _quality(history: History, fused: Fused) -> tuple[str, ...]:
-    agreeing = int((fused.weights > 0.5).sum()) + (history.earlier.frames if history.earlier else 0)
-    seen = np.isfinite(fused.parameters)
+    fusion = fused.fusion
+    agreeing = sum(weight > 0.5 for weight in fusion.weights) + (history.earlier.frames if history.earlier else 0)
+    seen = np.isfinite(fusion.parameters)
     holds = {
         "camera-moved": bool(history.moves),
         "few-frames": agreeing < 3,
         "many-frames-disagree": fused.disagreeing > MANY_FRACTION,
-        "frames-scatter": fused.excess > 4.0,
-        "scale-unknown": fused.scale_std > 0.0,
+        "frames-scatter": fusion.excess > 4.0,
+        "scale-unknown": fusion.scale_std > 0.0,
         "cone-not-seen": not seen[6],
         "cylinder-not-seen": not seen[4],
+        "deformed": fusion.deformed,
     }
     return tuple(code for code, true in holds.items() if true)
 
 
-def _kept(history: History, factors: FrameFactors, fused: Fused) -> Evidence:
-    """The newest frames' evidence; older frames added up with the weights they have now."""
-    spare = factors.count - MAX_KEPT_FACTORS
-    if spare <= 0:
-        return Evidence(history.evidence, history.earlier)
-    older = summed(factors.take(slice(0, spare)), fused.weights[:spare], fused.parameters, history.earlier)
-    return Evidence(history.evidence[spare:], older)
-
-
-def _determined(fused: Fused) -> bool:
+def _determined(fusion: _core.Fusion) -> bool:
     """Whether the frames, apart from an unknown scale, fix the pose."""
-    values, variance = fused.parameters, np.diag(fused.covariance)
+    values, variance = fusion.parameters, np.diag(fusion.covariance)
     size = values[4] if np.isfinite(values[4]) else values[6]
-    scale = (np.nan_to_num(values[2:4]) * fused.scale_std) ** 2
+    scale = (np.nan_to_num(values[2:4]) * fusion.scale_std) ** 2
     direction = math.sqrt(variance[0] + variance[1])
     position = math.sqrt(max(float((variance[2:4] - scale).sum()), 0.0))
     return direction < MAX_DIRECTION_STD and position < MAX_POSITION_STD * size
@@ -163,14 +163,16 @@ def _stamped(record: FrameRecord, status: str, weight: float) -> FrameRecord:
 
 def _mean_geometry(evidence: list[FrameFactor]) -> SiloGeometry:
     """Mean radius and apex of the frames that show them, and the cylinder's bottom from their mean cone."""
-    if not evidence:
-        return SiloGeometry()
-    values = np.array([e.parameters[4:7] for e in evidence])
-    values[:, 2] /= values[:, 1]  # the apex, from the cone's intercept and slope
-    means = [float(column[np.isfinite(column)].mean()) if np.isfinite(column).any() else None for column in values.T]
-    radius, slope, apex = means
+    radius = _mean(e.state[RADIUS] for e in evidence if e.has_cylinder)
+    cones = [e.state[SLOPE : SLOPE + 2] for e in evidence if e.has_cone and e.hopper and e.model in COAXIAL]
+    slope, apex = _mean(cone[0] for cone in cones), _mean(cone[1] / cone[0] for cone in cones)
     bottom = None if radius is None or slope is None or apex is None else apex - radius / slope
     return SiloGeometry(radius, bottom, apex)
+
+
+def _mean(values: Iterable[float]) -> float | None:
+    told = [float(value) for value in values]
+    return sum(told) / len(told) if told else None
 
 
 def _refused(reason: str, history: History, rule: str, config: dict[str, Any]) -> Calibration:

@@ -1,4 +1,4 @@
-"""What all frames of a calibration have in common: sensor, diameter, gravity, camera."""
+"""What all frames of a calibration have in common: sensor, diameter, gravity, camera and its intrinsics."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from siloscope.errors import InputError, UsageError
 from siloscope.fusion.located_frame import LocatedFrame
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
+from siloscope.types.intrinsics import IntrinsicsStd
 
 
 @dataclass(frozen=True)
@@ -22,26 +23,34 @@ class Settings:
     profile: SensorProfile
     diameter: float | None
     gravity: ArrayLike | None
+    intrinsics: str | IntrinsicsStd | None = None
+    vessels: str = "any"
+    """Which vessels may be in view; a calibration of frames of a coaxial one goes on with that."""
 
     def described(self) -> dict[str, Any]:
         """For the result's ``config``, and to be gone on with."""
         down = None if self.gravity is None else [float(g) for g in np.ravel(np.asarray(self.gravity, float))]
-        return {"sensor": self.profile.to_dict(), "diameter": self.diameter, "gravity": down}
+        exact = self.intrinsics.to_dict() if isinstance(self.intrinsics, IntrinsicsStd) else self.intrinsics
+        told = {"sensor": self.profile.to_dict(), "diameter": self.diameter, "gravity": down, "intrinsics": exact}
+        return {**told, "vessels": self.vessels}
 
 
 def settings_of(before: Calibration | None, **given: Any) -> Settings:
     """The caller's settings; those of the earlier calibration where the caller says nothing."""
     profile = sensors.load(given["sensor"])
-    mine = Settings(profile, given["diameter"], given["gravity"])
+    mine = Settings(profile, given["diameter"], given["gravity"], given["intrinsics"])
     if before is None or not before.config:
         return mine
     earlier = before.config
+    mine = replace(mine, vessels=earlier.get("vessels") or "any")
     if given["sensor"] is None:
         mine = replace(mine, profile=_profile(earlier.get("sensor")))
     if given["diameter"] is None:
         mine = replace(mine, diameter=earlier.get("diameter"))
     if given["gravity"] is None:
         mine = replace(mine, gravity=earlier.get("gravity"))
+    if given["intrinsics"] is None:
+        mine = replace(mine, intrinsics=_intrinsics(earlier.get("intrinsics")))
     for name in ("sensor", "diameter"):
         if mine.described()[name] != earlier.get(name):
             raise UsageError(
@@ -49,6 +58,10 @@ def settings_of(before: Calibration | None, **given: Any) -> Settings:
                 f"leave {name} out, or calibrate all frames anew"
             )
     return mine
+
+
+def _intrinsics(told: Any) -> str | IntrinsicsStd | None:
+    return IntrinsicsStd(**told) if isinstance(told, dict) else told
 
 
 def _short(value: Any) -> Any:
@@ -68,7 +81,7 @@ def brought_settings(answers: list[LocatedFrame]) -> dict[str, Any]:
     configs = [answer.estimate.config for answer in answers if answer.estimate is not None and not answer.made]
     if not configs or len(configs) < len(answers):
         return {}
-    common = {name: [config.get(name) for config in configs] for name in ("sensor", "diameter")}
+    common = {name: [config.get(name) for config in configs] for name in ("sensor", "diameter", "vessels")}
     return {name: told[0] for name, told in common.items() if told[0] is not None and all(v == told[0] for v in told)}
 
 

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope.reproduction.packing import packed, unpacked
 from siloscope.reproduction.solvers import ALL, KNOWN
+from siloscope.schema.frame_factor import Factor
 from siloscope.sensors import SensorProfile
 from siloscope.simulation import Scene, SimulatedFrame, metrics
 from siloscope.types.estimate import Estimate, Ratios
@@ -81,7 +81,7 @@ def _answer(estimate: Estimate, seconds: float) -> dict[str, Any]:
         "pose": None if pose is None else list(asdict(pose).values()),
         "covariance": None if covariance is None else covariance.tolist(),
         "silo": estimate.silo.to_dict(),
-        "evidence": None if estimate.evidence is None else packed(estimate.evidence),
+        "evidence": None if estimate.evidence is None else estimate.evidence.to_dict(),
         "distance": None,
     }
 
@@ -112,7 +112,7 @@ class Answer:
             None if data["pose"] is None else SiloPose(*data["pose"]),
             None if covariance is None else np.array(covariance),
             SiloGeometry(**data["silo"]),
-            None if evidence is None else unpacked(FrameFactor, evidence),
+            None if evidence is None else FrameFactor.read(Factor.model_validate(evidence)),
             data["distance"],
         )
 

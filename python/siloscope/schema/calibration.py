@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import AfterValidator, BeforeValidator, Field, PlainValidator, model_validator
 
 from siloscope.errors import InputError
@@ -20,42 +19,24 @@ from siloscope.schema.fields import (
     at_least,
     finite,
     symmetric,
-    triangle,
     vector,
 )
 from siloscope.schema.floor import FloorDocument
+from siloscope.schema.frame_factor import Numbered, Summed
 from siloscope.schema.sensor_profile import SensorRecord
 from siloscope.schema.validation import Document, validated, wrong
 
 LARGEST_FILE = 50_000_000
-"""Bytes; 300 frames of factors take about 2 MB."""
-
-MOST_RAYS = 1000
-"""No frame keeps as many."""
+"""Bytes; 100 frames of factors take about 2 MB."""
 
 REMEDY = "take the file as `siloscope calibrate` wrote it, or calibrate again"
 
+INTRINSICS = ("exact", "calibrated", "nominal")
+"""Names of how exactly intrinsics are known."""
+
 NAMES = f"must be {', '.join(PARAMETERS)}, as this version of siloscope has them"
 
-Vector = Annotated[Array, vector(SIZE)]
 Nullable = Annotated[Array, vector(SIZE, nullable=True)]
-Triangle = Annotated[Array, triangle(SIZE)]
-
-
-def _rays(value: Any) -> Array:
-    rows = value if isinstance(value, list) else [()]
-    if len(rows) > MOST_RAYS or not all(isinstance(row, list) and len(row) == 3 for row in rows):
-        raise wrong(f"must be at most {MOST_RAYS} times 3 numbers")
-    rays = np.array([[finite(v) for v in row] for row in rows]).reshape(-1, 3)
-    if (rays[:, 2] < 0.0).any():
-        raise wrong("has information below zero")
-    return rays
-
-
-def _flags(value: Any) -> Any:
-    if not isinstance(value, list) or len(value) != SIZE or not all(isinstance(f, bool) for f in value):
-        raise wrong(f"must be {SIZE} times true or false")
-    return np.array(value)
 
 
 def _code(value: Any) -> str:
@@ -76,6 +57,14 @@ def _diameter(value: float) -> float:
     if not 0.01 <= value <= 200.0:
         raise wrong("must be between 0.01 and 200 m")
     return value
+
+
+def _intrinsics(value: Any) -> str | tuple[float, float, float] | None:
+    if value is None or (isinstance(value, str) and value in INTRINSICS):
+        return value
+    if isinstance(value, dict) and set(value) == {"f", "c", "k1"}:
+        return finite(value["f"]), finite(value["c"]), finite(value["k1"])
+    raise wrong(f"must be one of {', '.join(INTRINSICS)}, or f, c and k1")
 
 
 def _reach(value: Any) -> tuple[float, float] | None:
@@ -179,62 +168,43 @@ class Record(Pose):
         return self
 
 
-class Factor(Document):
-    """What one frame says about all parameters."""
-
-    index: Index
-    parameters: Nullable
-    information: Triangle
-    gradient: Vector
-    scatter: Triangle
-    noise: Triangle
-    free: Annotated[Any, PlainValidator(_flags)]
-    prior_mean: Nullable
-    prior_information: Nullable
-    scale_std: NotNegative
-    linearization_point: Nullable = Field(alias="base")
-    rays: Annotated[Array, PlainValidator(_rays)]
-
-    @model_validator(mode="after")
-    def _estimated(self) -> Factor:
-        for name, values in (("parameters", self.parameters), ("base", self.linearization_point)):
-            if not np.isfinite(values[self.free]).all():
-                raise wrong("lacks a value that was estimated", name)
-        return self
-
-
-class Summed(Document):
-    """Factors of earlier frames added up."""
-
-    origin: Vector
-    information: Triangle
-    pull: Vector
-    noise: Triangle
-    shared: Triangle
-    weight: NotNegative
-    frames: Index
-    prior_information: Vector
-    prior_mean: Vector
+GROUPS = ("pose", "bias", "camera", "radius", "cylinder_form", "cone", "cone_form")
+"""Groups of the parameters of the evidence, in their order."""
 
 
 class Evidence(Document):
     """``evidence``: what the calibration rests on."""
 
     names: Any = None
-    frames: list[Factor]
+    frames: list[Numbered]
     earlier: Summed | None = None
 
     @model_validator(mode="before")
     @classmethod
-    def _named(cls, content: Any) -> Any:
-        holds = isinstance(content, dict) and (content.get("frames") or content.get("earlier"))
-        return _with_names(content) if holds else content
+    def _known(cls, content: Any) -> Any:
+        """Without what a version before wrote, from which a calibration can't be continued."""
+        if not isinstance(content, dict) or not (content.get("frames") or content.get("earlier")):
+            return content
+        if content.get("names") == list(PARAMETERS):
+            return {"names": content["names"], "frames": []}
+        if content.get("names") != list(GROUPS):
+            raise wrong(f"must be {', '.join(GROUPS)}, as this version of siloscope has them", "names")
+        return content
+
+
+class Model(Document):
+    """A vessel model and its probability."""
+
+    model: str
+    probability: NotNegative
 
 
 class Config(Document):
     """The settings that a calibration is continued with; the rest of ``config`` is kept as it is."""
 
     diameter: Annotated[float, BeforeValidator(finite), AfterValidator(_diameter)] | None = None
+    intrinsics: Annotated[Any, PlainValidator(_intrinsics)] = None
+    vessels: Literal["any", "coaxial"] | None = None
     gravity: Annotated[Array, vector(3)] | None = None
     sensor: SensorRecord | None = None
 
@@ -246,6 +216,8 @@ class CalibrationDocument(Pose):
     rule: str
     method: str
     covariance: Annotated[Array, symmetric(4)] | None = None
+    covariance_relative: Annotated[Array, symmetric(4)] | None = None
+    models: list[Model] = Field(default_factory=list)
     silo: Silo
     parameters: Parameters | None = None
     excess: Annotated[float, BeforeValidator(finite), AfterValidator(at_least(1.0))]

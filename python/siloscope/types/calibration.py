@@ -16,7 +16,7 @@ from siloscope.reasons import FRAME_STATUSES, calibration_remark
 from siloscope.schema import CALIBRATION
 from siloscope.types.by_value import ByValue
 from siloscope.types.floor import Floor, FloorMap, SeenCone
-from siloscope.types.frame_factor import FrameFactor, SummedFactor
+from siloscope.types.frame_factor import GROUPS, FrameFactor, SummedFactor
 from siloscope.types.move import Move
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry, vessel_to_dict
@@ -78,7 +78,7 @@ class Evidence(ByValue):
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {
-            "names": list(PARAMETERS),
+            "names": list(GROUPS),
             "frames": [{"index": number, **factor.to_dict()} for number, factor in self.frames],
             "earlier": None if self.earlier is None else self.earlier.to_dict(),
         }
@@ -120,6 +120,10 @@ class Calibration(ByValue):
     method: str = "surface"
     floor: Floor = field(default_factory=Floor)
     """What the calibration was told of the bottom, or has proved."""
+    models: tuple[tuple[str, float], ...] = ()
+    """Vessel models with their probabilities, most probable first."""
+    covariance_relative: NDArray[np.float64] | None = None
+    """(4, 4) covariance of the pose if the intrinsics were exact: of poses of one camera to each other."""
 
     @property
     def ok(self) -> bool:
@@ -183,6 +187,9 @@ class Calibration(ByValue):
             **{name: None if pose is None else getattr(pose, name) for name in names},
             "std": {name: None if std is None else float(std[i]) for i, name in enumerate(names)},
             "covariance": None if self.covariance is None else self.covariance.tolist(),
+            "std_relative": dict(zip(names, _stds(self.covariance_relative), strict=True)),
+            "covariance_relative": None if self.covariance_relative is None else self.covariance_relative.tolist(),
+            "models": [{"model": name, "probability": probability} for name, probability in self.models],
             "T_silo_camera": None if pose is None else pose.T_silo_camera.tolist(),
             "axis": {
                 "direction": None if pose is None else pose.axis_direction.tolist(),
@@ -239,6 +246,10 @@ class Calibration(ByValue):
         return _from_document(*read(Path(path)))
 
 
+def _stds(covariance: NDArray[np.float64] | None) -> list[float | None]:
+    return [None] * 4 if covariance is None else np.sqrt(np.diag(covariance)).tolist()
+
+
 def _from_document(told: CalibrationDocument, config: dict[str, Any]) -> Calibration:
     ok = told.status == "ok"
     parameters = told.parameters if ok else None
@@ -263,6 +274,8 @@ def _from_document(told: CalibrationDocument, config: dict[str, Any]) -> Calibra
         _evidence(told.evidence),
         told.method,
         Floor() if told.floor is None else _floor(told.floor),
+        tuple((one.model, one.probability) for one in told.models),
+        told.covariance_relative if ok else None,
     )
 
 
@@ -278,9 +291,8 @@ def _record(told: Record) -> FrameRecord:
 
 
 def _evidence(told: EvidenceDocument) -> Evidence:
-    frames = tuple((frame.index, FrameFactor(**_fields(FrameFactor, frame))) for frame in told.frames)
-    earlier = told.earlier
-    return Evidence(frames, None if earlier is None else SummedFactor(**_fields(SummedFactor, earlier)))
+    frames = tuple((frame.index, FrameFactor.read(frame)) for frame in told.frames)
+    return Evidence(frames, None if told.earlier is None else SummedFactor.read(told.earlier))
 
 
 def _fields(kind: type[Any], told: Any) -> dict[str, Any]:

@@ -9,9 +9,12 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import numpy as np
+
 from siloscope.types.calibration import Calibration
 from siloscope.types.floor import Floor, SeenCone
 from siloscope.types.remark import Remark
+from siloscope.types.vessel import geometry_of
 from siloscope.vessel.datasheet import Datasheet
 from siloscope.vessel.limits import LENGTH_STD
 
@@ -83,10 +86,26 @@ def _hidden(calibration: Calibration, seen: SeenCone | None) -> float | None:
     return math.hypot(tip, ring) / math.sqrt(3.0)
 
 
-def calibrated_floor(found: Calibration, bottom: str | None, before: Calibration | None) -> Floor:
-    """The bottom for a calibration to keep: what it is told now, else was told earlier, else has proved."""
+def with_floor(found: Calibration, bottom: str | None, before: Calibration | None) -> Calibration:
+    """With the bottom for a calibration to keep: what it is told now, else was told earlier, else has proved."""
     told = found if before is None or not found.ok else replace(found, floor=before.floor)
-    return floor_of(told, Datasheet(bottom=bottom))[0]
+    floor = floor_of(told, Datasheet(bottom=bottom))[0]
+    return replace(with_cone(found) if has_seen_cone(floor) else found, floor=floor)
+
+
+def has_seen_cone(floor: Floor) -> bool:
+    """Whether the conical surface that was seen is the bottom."""
+    return floor.kind == "cone" and floor.seen is not None
+
+
+def with_cone(calibration: Calibration) -> Calibration:
+    """The calibration whose silo has the conical surface that was seen as its bottom."""
+    values, covariance = calibration.parameters, calibration.parameter_covariance
+    if values is None or covariance is None or calibration.silo.apex is not None or not np.isfinite(values[5:7]).all():
+        return calibration
+    radius = float(values[4]) if np.isfinite(values[4]) else None
+    silo, silo_std = geometry_of(radius, (float(values[5]), float(values[6])), covariance)
+    return replace(calibration, silo=silo, silo_std=silo_std)
 
 
 def seen_cone(calibration: Calibration) -> SeenCone | None:

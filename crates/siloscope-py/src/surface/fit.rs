@@ -1,8 +1,8 @@
 //! The surface fit's result: to add a number, add a getter here and a line to `_core.pyi`.
 
-use super::factor::FrameFactor;
 use super::warm_start::WarmStart;
 use crate::arrays::{matrix, vectors};
+use crate::fusion::FrameFactor;
 use crate::inputs::DepthFrame;
 use crate::outcome::{StageTime, stages};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -110,7 +110,7 @@ impl SurfaceFit {
     /// What this frame alone says, for fusing frames.
     #[getter]
     fn factor(&self) -> FrameFactor {
-        FrameFactor(self.fit.share.clone())
+        FrameFactor(self.fit.factor.clone())
     }
 
     /// Where other frames of the camera may look for the wall first; None for clouds.

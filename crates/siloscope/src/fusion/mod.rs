@@ -1,4 +1,15 @@
-//! What a frame leaves behind for the fusion of many.
+//! Many frames of one silo and camera: their factors solved together.
 
-pub mod frame_factor;
+pub mod agreement;
+pub mod common;
+pub mod contrast;
+pub mod earlier;
+#[allow(clippy::module_inception)]
+pub mod fusion;
+pub mod heights;
+pub mod moves;
+pub mod placed;
 pub mod relinearize;
+pub mod solve;
+pub mod start;
+pub mod sum;

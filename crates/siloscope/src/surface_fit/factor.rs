@@ -1,21 +1,23 @@
-//! What one frame alone says about all parameters: its Gaussian factor, from the last equations of its fit.
+//! The factor of a fit in twelve parameters, from its last equations.
 
 use crate::Vec3;
-use crate::fusion::frame_factor::{FrameFactor, restrict};
-use crate::fusion::relinearize::{RAYS, Ray};
 use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
 use crate::geometry::surface::Part;
 use crate::surface_fit::equation::{TileEquation, tukey};
-use crate::surface_fit::solver::System;
+use crate::surface_fit::frame_factor::{FrameFactor, RAYS, Ray, restrict, whole_share};
+use crate::surface_fit::joint::model::{Inputs, Model};
+use crate::surface_fit::joint::search::state_of;
+use crate::surface_fit::solver::{Fit, System};
 
 /// From the system of all parameters with its covariance, as the noise has it and as the residuals have it; the
-/// last equations and how they pull; which parameters are free in the frame's own answer, and here; where the
-/// equations were made, and on which rays.
+/// last equations and how they pull; which parameters are free in the frame's own answer, and here; what was known
+/// before, and the rays that are kept.
 pub fn frame_factor(
+    fit: &Fit,
     (system, model, covariance): (&System, &Information, &Information),
     (tiles, pulls): (&[TileEquation], &[f64]),
     (alone, free): (&[bool; PARAMETERS], &[bool; PARAMETERS]),
-    (base, rays): (Parameters, Vec<Ray>),
+    (known, scale_std, rays): (Inputs, f64, Vec<Ray>),
 ) -> FrameFactor {
     let mut information = system.information - system.prior;
     information.fill_upper_triangle_with_lower_triangle();
@@ -27,6 +29,8 @@ pub fn frame_factor(
     }
     let mut noise = sensor.information;
     noise.fill_upper_triangle_with_lower_triangle();
+    let state = state_of(fit);
+    let radius = fit.surface.radius.unwrap_or(1.0);
     let mut step = Parameters::zeros();
     if free[OVALITY] && !alone[OVALITY] {
         // all other parameters are at their best already
@@ -35,7 +39,16 @@ pub fn frame_factor(
     }
     let joint = restrict(&(information + system.prior), free);
     let scatter = joint * covariance * joint - restrict(&system.prior, free);
-    FrameFactor { step, information, gradient, scatter, noise, prior: system.prior.diagonal(), base, rays }
+    let seen = (radius, 0.5);
+    let mut share = whole_share((&information, &gradient), (&scatter, &noise), free, seen);
+    let back: Vec<f64> = (0..PARAMETERS).map(|k| -step[k] * if k >= OVALITY { radius } else { 1.0 }).collect();
+    share.gradient = share.gradient_after(&back);
+    let shape = match (state.has_cylinder, state.has_cone) {
+        (true, true) => Model::CoaxialCone,
+        (true, false) => Model::Cylinder,
+        _ => Model::ConeAlone,
+    };
+    FrameFactor { state, model: shape, hopper: true, shares: vec![share], known, scale_std, rays }
 }
 
 /// Least share of the rays for a part that is seen.

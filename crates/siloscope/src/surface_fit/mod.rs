@@ -7,6 +7,7 @@ pub mod covariance;
 pub mod diagnostics;
 pub mod equation;
 pub mod factor;
+pub mod frame_factor;
 pub mod grain;
 pub mod joint;
 pub mod likelihood;
@@ -29,14 +30,14 @@ pub mod vertex;
 pub mod warm_start;
 
 use crate::Result;
+use crate::SiloPose;
 use crate::Vec3;
 use crate::base::clock::Clock;
 use crate::base::refusal::Refusal;
 use crate::base::workers::Workers;
-use crate::fusion::frame_factor::restrict;
 use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
-use crate::geometry::parameters::{Information, OVALITY};
+use crate::geometry::parameters::{BIAS, Information, OVALITY, PARAMETERS};
 use crate::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
 use crate::geometry::surface::SurfaceTolerance;
 use crate::surface_fit::bow::bow_uncertainty;
@@ -47,8 +48,10 @@ use crate::surface_fit::covariance::{
 };
 use crate::surface_fit::diagnostics::WallEvidence;
 use crate::surface_fit::factor::{frame_factor, some_rays};
+use crate::surface_fit::frame_factor::restrict;
 use crate::surface_fit::grain::relief_with_grain;
-use crate::surface_fit::joint::fit_inside;
+use crate::surface_fit::joint::model::Inputs;
+use crate::surface_fit::joint::{Start, fit_inside};
 use crate::surface_fit::likelihood::may_be_feed;
 use crate::surface_fit::model_selection::{Settled, coarse_fit, drop_film};
 use crate::surface_fit::outcome::check_determined;
@@ -88,11 +91,22 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge, known: Option<&KnownWall>
     clock.lap("patches");
     let (noise, prior, pixel) = (noise(&patches, know), prior(know), image.pixel_size());
     let confirmed = known.and_then(|wall| {
-        let found = confirmed(&mut patches, noise, &prior, pixel, wall);
-        clock.lap("known wall");
-        let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
-        let from = (found?, Looks::None, [].as_slice());
-        fit_from(problem, image, know, from, &mut clock).ok().filter(|fit| fit.confirms(wall))
+        let found = match know.vessels {
+            Vessels::Any { .. } if wall.inside => {
+                if prior.bias_std[2] > 0.0 {
+                    patches.unbias_normals(&wall.bias);
+                }
+                let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
+                fit_inside(&problem, image, know, Start::Known(wall), &mut clock)
+            }
+            _ => {
+                let found = confirmed(&mut patches, noise, &prior, pixel, wall);
+                clock.lap("known wall");
+                let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
+                measured(problem, image, know, found?, Looks::None, &mut clock)
+            }
+        };
+        found.ok().filter(|fit| fit.confirms(wall))
     });
     let mut result = match confirmed {
         Some(fit) => fit,
@@ -102,9 +116,9 @@ pub fn fit_image(image: &DepthImage, know: &Knowledge, known: Option<&KnownWall>
             clock.lap("coarse fit");
             let problem = Problem { patches: &patches, noise, prior: &prior, pixel };
             match found {
-                Ok(found) => fit_from(problem, image, know, (found, Looks::Usual, &proposals), &mut clock)?,
+                Ok(found) => fit_from(problem, image, know, (found, &proposals), &mut clock)?,
                 Err(why) if know.vessels == Vessels::Coaxial => return Err(why),
-                Err(why) => fit_inside(&problem, image, know, None, &proposals, &mut clock)
+                Err(why) => fit_inside(&problem, image, know, Start::Searched(None, &proposals), &mut clock)
                     .map_err(|own| if own == Refusal::NoWall { why } else { own })?,
             }
         }
@@ -119,12 +133,14 @@ fn fit_from(
     problem: Problem,
     image: &DepthImage,
     know: &Knowledge,
-    (found, looks, proposals): (Settled, Looks, &[Fit]),
+    (found, proposals): (Settled, &[Fit]),
     clock: &mut Clock,
 ) -> Outcome {
     match know.vessels {
-        Vessels::Any { .. } if found.fit.inside => fit_inside(&problem, image, know, Some(found), proposals, clock),
-        _ => measured(problem, image, know, found, looks, clock),
+        Vessels::Any { .. } if found.fit.inside => {
+            fit_inside(&problem, image, know, Start::Searched(Some(&found), proposals), clock)
+        }
+        _ => measured(problem, image, know, found, Looks::Usual, clock),
     }
 }
 
@@ -298,7 +314,6 @@ fn finish(
     (evidence, wall): (WallEvidence, KnownWall),
     relief: f64,
 ) -> Outcome {
-    let base = fit.surface.parameters(&fit.bias);
     let system = solve_equations(problem, &mut fit, tiles, 4).ok_or(Refusal::PoorlyDetermined)?;
     let pulls: Vec<f64> = tiles.iter().map(TileEquation::pull).collect();
     let free = free_parameters(&fit, &system.prior);
@@ -319,15 +334,16 @@ fn finish(
     }
     let bias_is_free = free[7..OVALITY].contains(&true);
     let rays = if bias_is_free { some_rays(tiles, |patch| problem.patches.list[patch].q) } else { Vec::new() };
-    let share = frame_factor((&joint, &model, &covariance), (tiles, &pulls), (&free, &jointly_free), (base, rays));
+    let scale_std = if free[8] { 0.0 } else { problem.prior.bias_std[1] };
+    let known = (inputs(problem.prior, &free), scale_std, rays);
+    let solved = (&joint, &model, &covariance);
+    let factor = frame_factor(&fit, solved, (tiles, &pulls), (&free, &jointly_free), known);
     let mut covariance = restrict(&covariance, &free);
-    if !free[8] {
-        covariance += scale_uncertainty(&fit, problem.prior.bias_std[1]);
-    }
+    covariance += scale_uncertainty(&fit, scale_std);
     let (residuals, chi_square) = residuals(tiles, problem.patches.list.len());
     Ok(SurfaceFit {
         covariance,
-        share,
+        factor,
         free,
         noise: problem.noise,
         chi_square,
@@ -339,6 +355,17 @@ fn finish(
         timing: Vec::new(),
         joint: None,
     })
+}
+
+/// What was known before, as the joint fit has it; the bias where it is estimated.
+fn inputs(prior: &Prior, free: &[bool; PARAMETERS]) -> Inputs {
+    Inputs {
+        bias: prior.bias,
+        bias_std: std::array::from_fn(|k| if free[BIAS.start + k] { prior.bias_std[k] } else { 0.0 }),
+        radius: prior.radius,
+        gravity: prior.gravity.map(|(down, std)| (SiloPose::from_axis(&down, &Vec3::zeros()), std)),
+        camera_std: [0.0; 5],
+    }
 }
 
 /// Residual of each of n patches across the wall, NaN where it does not count, and their reduced chi-square.

@@ -2,11 +2,11 @@
 
 use crate::Vec3;
 use crate::base::refusal::Refusal;
-use crate::fusion::frame_factor::FrameFactor;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::parameters::{Information, PARAMETERS, Parameters};
 use crate::geometry::sensor::{DepthError, NoiseLaw};
 use crate::surface_fit::diagnostics::WallEvidence;
+use crate::surface_fit::frame_factor::FrameFactor;
 use crate::surface_fit::joint::summary::JointSummary;
 use crate::surface_fit::solver::Fit;
 use crate::surface_fit::tiles::Patches;
@@ -28,7 +28,7 @@ pub struct Knowledge {
 /// Which vessels an image may show.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Vessels {
-    /// A cylinder on a coaxial cone, seen through exact intrinsics: the model in which frames are fused.
+    /// A cylinder on a coaxial cone, seen through exact intrinsics.
     Coaxial,
     /// Those of the joint fit, which compete.
     Any {
@@ -45,7 +45,7 @@ pub struct SurfaceFit {
     /// Covariance over all parameters; zero rows for those that are not free.
     pub covariance: Information,
     /// What this frame alone says, without priors (for fusing frames).
-    pub share: FrameFactor,
+    pub factor: FrameFactor,
     /// Which parameters are estimated.
     pub free: [bool; PARAMETERS],
     /// Noise law used.

@@ -25,7 +25,7 @@ pub struct KnownWall {
 }
 
 /// Least share of the patches that must be wall: a frame that shows less is searched for what else it may show.
-const LEAST_SHARE: f64 = 0.35;
+pub(crate) const LEAST_SHARE: f64 = 0.35;
 /// Most misfit where the depth's bend is fitted too, as a share of the silo's size: a rough wall and a bent depth trade.
 const MOST_MISFIT: f64 = 1e-3;
 /// How far the wall may be from the known one.
@@ -42,7 +42,7 @@ pub fn confirmed(
     known: &KnownWall,
 ) -> Option<Settled> {
     let prior = &with_free_size(prior);
-    let mut fit = known.fit(patches.list.len());
+    let mut fit = known.loose_fit(patches.list.len());
     let bends = prior.bias_std[2] > 0.0;
     if bends {
         Problem { patches, noise, prior, pixel }.refine(&mut fit, 3, 4, 0.2);
@@ -67,9 +67,14 @@ impl KnownWall {
         self.surface.cone = self.surface.cone.filter(|_| wall.cone.is_some());
     }
 
-    fn fit(&self, patches: usize) -> Fit {
-        let misfit = LOOSER * self.misfit;
-        Fit { surface: self.surface, bias: self.bias, inside: self.inside, misfit, weights: vec![0.0; patches] }
+    /// As a fit of no patches.
+    pub fn fit(&self) -> Fit {
+        let Self { surface, bias, inside, misfit, .. } = *self;
+        Fit { surface, bias, inside, misfit, weights: Vec::new() }
+    }
+
+    fn loose_fit(&self, patches: usize) -> Fit {
+        Fit { misfit: LOOSER * self.misfit, weights: vec![0.0; patches], ..self.fit() }
     }
 
     /// Whether a wall has the same parts, in the same place.

@@ -1,53 +1,68 @@
-//! What one frame alone says, for other frames of the same silo and camera.
+//! A fit's factor: what its tiles say, without what was known before.
 
+use crate::geometry::surface::Part;
+use crate::surface_fit::frame_factor::{FrameFactor, Kind, RAYS, Ray, Share};
 use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::model::Model;
-use crate::surface_fit::joint::parameters::{JointState, SIZE};
-use crate::surface_fit::joint::select::Weighed;
+use crate::surface_fit::joint::search::{tiles_met, wall_tiles};
 use crate::surface_fit::joint::solve::JointFit;
-use nalgebra::{DMatrix, DVector};
 
-/// A frame's negative log-likelihood ½ δᵀ H δ + gᵀ δ about a state, over pose, geometry, form, intrinsics and bias.
-///
-/// No prior is in it. Columns of parts that the frame does not show are zero. See `parameters` for their order.
-#[derive(Debug, Clone)]
-pub struct JointFactor {
-    /// The most probable model.
-    pub model: Model,
-    /// Every model's ln p(frame, model) with the frame's own priors, up to a constant.
-    pub log_evidence: Vec<(Model, f64)>,
-    /// Linearisation point θ₀.
-    pub state: JointState,
-    /// H (SIZE × SIZE), the information; already divided by the correlation factors within the frame.
-    pub information: DMatrix<f64>,
-    /// g, the gradient at θ₀.
-    pub gradient: DVector<f64>,
-    /// Fraction of H's score variance that the sensor's noise makes: new in every frame.
-    pub sensor_fraction: f64,
-    /// Model error of cylinder and cone, metres.
-    pub tau: [f64; 2],
-    /// Number of wall tiles of cylinder and cone.
-    pub tiles: [f64; 2],
+/// The factor of a fit whose most probable model is `model`; `hopper` tells whether its cone is known to be the silo's.
+pub fn frame_factor(frame: &Frame, fit: &JointFit, (model, hopper): (Model, bool), scale_std: f64) -> FrameFactor {
+    let fractions = sensor_fractions(frame, fit);
+    let (tiles, met) = (wall_tiles(fit), tiles_met(fit).max(1.0));
+    let share = |(p, kind): (usize, Kind)| {
+        let part = &fit.quadratic.parts[p];
+        (tiles[p] > 0.0).then(|| Share {
+            kind,
+            information: part.information.clone(),
+            gradient: part.gradient.clone(),
+            sensor_fraction: fractions[p],
+            seen: tiles[p] / met,
+        })
+    };
+    FrameFactor {
+        state: fit.state.clone(),
+        model,
+        hopper,
+        shares: [Kind::Cylinder, Kind::Cone].into_iter().enumerate().filter_map(share).collect(),
+        known: frame.inputs.clone(),
+        scale_std,
+        rays: rays(frame, fit, model == Model::CoaxialCone),
+    }
 }
 
-impl JointFactor {
-    /// Of a fit with the models' weights.
-    pub fn new(frame: &Frame, fit: &JointFit, weighed: &[Weighed]) -> Self {
-        Self {
-            model: weighed.first().map_or(fit.model, |w| w.model),
-            log_evidence: weighed.iter().map(|w| (w.model, w.log_evidence)).collect(),
-            state: fit.state.clone(),
-            information: fit.quadratic.information.clone(),
-            gradient: fit.quadratic.gradient.clone(),
-            sensor_fraction: super::answer::sensor_fraction(frame, fit),
-            tau: fit.tau,
-            tiles: super::search::wall_tiles(fit),
-        }
+/// Fraction of each part's score variance that the sensor's noise makes.
+fn sensor_fractions(frame: &Frame, fit: &JointFit) -> [f64; 2] {
+    let mut sums = [[0.0; 2]; 2];
+    for (i, sight) in fit.sights.iter().enumerate() {
+        let Some(sight) = sight else { continue };
+        let p = usize::from(sight.at.part == Part::Cone);
+        let weight = fit.labels.wall[i] / fit.labels.variance[i];
+        sums[p][0] += weight * frame.readings.variance[i] / (fit.labels.variance[i] * fit.correlation[p]);
+        sums[p][1] += weight;
     }
+    sums.map(|[noise, all]| if all > 0.0 { (noise / all).min(1.0) } else { 0.0 })
+}
 
-    /// The gradient at another point: g + H (θ − θ₀).
-    pub fn gradient_at(&self, x: &[f64; SIZE]) -> DVector<f64> {
-        let off = DVector::from_fn(SIZE, |k, _| x[k] - self.state.x[k]);
-        &self.gradient + &self.information * off
+/// Some of the wall's rays with their information, where the depth bias is free.
+fn rays(frame: &Frame, fit: &JointFit, cone: bool) -> Vec<Ray> {
+    if frame.inputs.bias_std == [0.0; 3] {
+        return Vec::new();
     }
+    let parts = [Part::Cylinder, Part::Cone].into_iter().filter(|part| cone || *part == Part::Cylinder);
+    parts.flat_map(|part| rays_of(frame, fit, part)).collect()
+}
+
+fn rays_of(frame: &Frame, fit: &JointFit, part: Part) -> Vec<Ray> {
+    let wall = |&i: &usize| fit.labels.wall[i] > 0.5 && fit.sights[i].is_some_and(|s| s.at.part == part);
+    let tiles: Vec<usize> = (0..fit.sights.len()).filter(wall).collect();
+    let n = RAYS.min(tiles.len());
+    let stands_for = tiles.len() as f64 / n.max(1) as f64;
+    let ray = |k: usize| {
+        let i = tiles[(2 * k + 1) * tiles.len() / (2 * n)];
+        let q = frame.readings.patches.list[i].q;
+        [q.x, q.y, stands_for * fit.labels.wall[i] / fit.labels.variance[i]]
+    };
+    (0..n).map(ray).collect()
 }

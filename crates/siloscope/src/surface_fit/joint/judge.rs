@@ -48,8 +48,8 @@ const BEHIND: f64 = 0.05;
 /// Fraction of the wall's tiles at either end that is left out of the heights on which it is seen.
 const OUTLYING: f64 = 0.02;
 
-/// Refuses what is no silo's wall, or not surely.
-pub fn judge(frame: &Frame, search: &Search) -> Result<(), Refusal> {
+/// Refuses what is no silo's wall, or not surely; a `known` wall need not show again that its axis is the cylinder's.
+pub fn judge(frame: &Frame, search: &Search, known: bool) -> Result<(), Refusal> {
     let best = search.weighed.first().ok_or(Refusal::NoWall)?;
     let fit = search.fits.get(best.fit).ok_or(Refusal::NoWall)?;
     let [cylinder, cone] = wall_tiles(fit);
@@ -61,7 +61,7 @@ pub fn judge(frame: &Frame, search: &Search) -> Result<(), Refusal> {
     let weak = tied && cylinder < WEAK_CYLINDER * all;
     let sound = fit.state.x[SLOPE] < HOPPER_SLOPE && is_round(fit);
     let agrees = frame.inputs.gravity.is_some() && agrees_with_gravity(frame, fit, best.model);
-    let leads = best.model.is_cone_alone() || cylinder < LEAST_CYLINDER || weak && !sound;
+    let leads = best.model.is_cone_alone() || !known && (cylinder < LEAST_CYLINDER || weak && !sound);
     if leads && !agrees {
         return Err(Refusal::ConeAlone);
     }

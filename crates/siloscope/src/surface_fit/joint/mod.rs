@@ -33,15 +33,16 @@ use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::surface::{Cone, Part, SiloSurface, SurfaceTolerance};
 use crate::surface_fit::diagnostics::{WallEvidence, wall_evidence};
+use crate::surface_fit::frame_factor::FrameFactor;
 use crate::surface_fit::joint::answer::{JointAnswer, answer};
-use crate::surface_fit::joint::factor::JointFactor;
+use crate::surface_fit::joint::factor::frame_factor;
 use crate::surface_fit::joint::form::Form;
 use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::judge::{LEAST_ARC_ALONE, MOST_BEHIND, is_ambiguous, judge, judge_wall};
 use crate::surface_fit::joint::model::{HOPPER_SLOPE, Inputs, Model};
 use crate::surface_fit::joint::parameters::{INTERCEPT, SLOPE};
 use crate::surface_fit::joint::readings::Readings;
-use crate::surface_fit::joint::search::{Search, arc, search, wall_tiles};
+use crate::surface_fit::joint::search::{Search, arc, search, search_again, wall_tiles};
 use crate::surface_fit::joint::solve::JointFit;
 use crate::surface_fit::joint::summary::JointSummary;
 use crate::surface_fit::model_selection::{Settled, oriented};
@@ -61,15 +62,17 @@ const LEAST_CONE: f64 = 60.0;
 /// Model error of a cone beyond its cylinder's that is a surface of feed, metres.
 const RIPPLED: f64 = 1e-3;
 
-/// Fits the vessel to an image seen from inside; `near` is a wall found on tiles, `proposals` are rougher ones.
-pub fn fit_inside(
-    problem: &Problem,
-    image: &DepthImage,
-    know: &Knowledge,
-    near: Option<Settled>,
-    proposals: &[Fit],
-    clock: &mut Clock,
-) -> Outcome {
+/// From where a vessel is fitted.
+#[derive(Debug, Clone, Copy)]
+pub enum Start<'a> {
+    /// From a wall found on tiles, where there is one, and rougher proposals.
+    Searched(Option<&'a Settled>, &'a [Fit]),
+    /// From the wall of another frame, which has stood up to all evidence.
+    Known(&'a KnownWall),
+}
+
+/// Fits the vessel to an image seen from inside.
+pub fn fit_inside(problem: &Problem, image: &DepthImage, know: &Knowledge, start: Start, clock: &mut Clock) -> Outcome {
     if know.gravity.is_some_and(|(down, _)| down.z <= 0.0) {
         return Err(Refusal::AboveHorizon);
     }
@@ -84,15 +87,21 @@ pub fn fit_inside(
         }
         fit
     };
-    let start = near.as_ref().map(|s| placed(&Fit { surface: s.fit.surface.without(s.bare), ..s.fit.clone() }));
-    let proposals: Vec<Fit> = proposals.iter().map(placed).collect();
     let bias = know.error.bias;
-    let oriented = oriented(problem, &bias);
-    let found = search(&frame, start.as_ref(), &proposals, |surface| other_part(surface, &oriented));
-    clock.lap("models");
-    judge(&frame, &found)?;
+    let (found, near) = match start {
+        Start::Known(wall) => (search_again(&frame, &placed(&wall.fit())).ok_or(Refusal::NoWall)?, None),
+        Start::Searched(near, proposals) => {
+            let from = near.map(|s| placed(&Fit { surface: s.fit.surface.without(s.bare), ..s.fit.clone() }));
+            let proposals: Vec<Fit> = proposals.iter().map(placed).collect();
+            let oriented = oriented(problem, &bias);
+            (search(&frame, from.as_ref(), &proposals, |surface| other_part(surface, &oriented)), near)
+        }
+    };
+    let known = matches!(start, Start::Known(_));
+    clock.lap(if known { "known wall" } else { "models" });
+    judge(&frame, &found, known)?;
     let scale = if scale_is_free { 0.0 } else { know.error.bias_std[1] };
-    let outcome = told(problem, &frame, &found, scale, near.as_ref());
+    let outcome = told(problem, &frame, &found, scale, near);
     clock.lap("answer");
     outcome
 }
@@ -134,8 +143,8 @@ fn told(problem: &Problem, frame: &Frame, found: &Search, scale: f64, near: Opti
         return Err(Refusal::AmbiguousVessel);
     }
     check_determined(&answer.covariance, &SurfaceEvaluator::new(answer.surface), sum / f64::max(n, 1.0))?;
-    let factor = JointFactor::new(frame, fit, &found.weighed);
-    Ok(surface_fit(problem, fit, (answer, factor), evidence, near))
+    let factor = frame_factor(frame, fit, (best.model, hopper), scale);
+    Ok(surface_fit(problem, (fit, best.model), (answer, factor), evidence, near))
 }
 
 /// Whether the cone is the silo's own: coaxial or oblique, and steeper than feed lies or with feed in it.
@@ -162,19 +171,19 @@ fn tile_fit(fit: &JointFit, model: Model) -> Fit {
 
 fn surface_fit(
     problem: &Problem,
-    fit: &JointFit,
-    (answer, factor): (JointAnswer, JointFactor),
+    (fit, model): (&JointFit, Model),
+    (answer, factor): (JointAnswer, FrameFactor),
     evidence: WallEvidence,
     near: Option<&Settled>,
 ) -> SurfaceFit {
     let bias = fit.state.bias();
     let tiles =
         Fit { surface: answer.surface, bias, inside: true, misfit: fit.tau[0].max(fit.tau[1]), weights: Vec::new() };
-    let mut wall = KnownWall { surface: answer.surface, bias, inside: true, misfit: tiles.misfit, oval: false };
-    wall.surface.ovality = [0.0; 2];
+    let shown = tile_fit(fit, model).surface; // its cone may be no hopper's, and still be there in the next frame
+    let mut wall = KnownWall { surface: shown, bias, inside: true, misfit: tiles.misfit, oval: false };
     if let Some(near) = near {
         wall = KnownWall::of(near);
-        wall.drop_parts_without(&answer.surface);
+        wall.drop_parts_without(&shown);
     }
     let (mut residuals, mut chi, mut weights) = (vec![f64::NAN; fit.sights.len()], 0.0, 0.0);
     for (i, sight) in fit.sights.iter().enumerate() {
@@ -187,7 +196,7 @@ fn surface_fit(
     }
     SurfaceFit {
         covariance: answer.covariance,
-        share: answer.share.clone(),
+        factor,
         free: answer.free,
         noise: problem.noise,
         chi_square: chi / f64::max(weights, 1.0),
@@ -203,7 +212,6 @@ fn surface_fit(
             amplitudes: fit.amplitudes.form,
             camera_factor: fit.amplitudes.camera,
             answer,
-            factor,
         })),
     }
 }

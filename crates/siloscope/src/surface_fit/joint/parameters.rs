@@ -18,6 +18,8 @@ pub const COMMON: usize = 12;
 pub const RADIUS: usize = 12;
 /// The cylinder's form, metres.
 pub const CYLINDER_FORM: usize = 13;
+/// The cylinder's ovality, the same at all heights, two columns: after the rings' 8 and the bend's 8.
+pub const OVAL_COLUMN: usize = CYLINDER_FORM + 16;
 /// End of the cylinder's columns.
 pub const CYLINDER_END: usize = CYLINDER_FORM + CYLINDER_TERMS;
 /// Slope of the cone.
@@ -94,12 +96,19 @@ impl JointState {
 
     /// A ray of the told intrinsics, corrected by their errors.
     #[inline(always)]
-    pub fn corrected(&self, [x, y]: [f64; 2]) -> [f64; 2] {
-        let [fx, fy, cx, cy, k1] =
-            [self.x[CAMERA], self.x[CAMERA + 1], self.x[CAMERA + 2], self.x[CAMERA + 3], self.x[CAMERA + 4]];
-        let radial = k1 * (x * x + y * y);
-        [x - cx - x * (fx + radial), y - cy - y * (fy + radial)]
+    pub fn corrected(&self, ray: [f64; 2]) -> [f64; 2] {
+        corrected(
+            ray,
+            &[self.x[CAMERA], self.x[CAMERA + 1], self.x[CAMERA + 2], self.x[CAMERA + 3], self.x[CAMERA + 4]],
+        )
     }
+}
+
+/// A ray of the told intrinsics, corrected by their errors: focal lengths (relative), principal point (rays), k1.
+#[inline(always)]
+pub fn corrected([x, y]: [f64; 2], [fx, fy, cx, cy, k1]: &[f64; 5]) -> [f64; 2] {
+    let radial = k1 * (x * x + y * y);
+    [x - cx - x * (fx + radial), y - cy - y * (fy + radial)]
 }
 
 /// Cones flatter in radius per height than this are cylinders.

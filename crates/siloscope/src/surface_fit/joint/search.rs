@@ -4,11 +4,12 @@ use crate::geometry::surface::{Part, SiloSurface, SurfaceTolerance};
 use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::model::Model;
 use crate::surface_fit::joint::parameters::{
-    BIAS, CYLINDER_FORM, INTERCEPT, JointState, OBLIQUITY, OFFSET, RADIUS, SIZE, SLOPE,
+    BIAS, INTERCEPT, JointState, OBLIQUITY, OFFSET, OVAL_COLUMN, RADIUS, SIZE, SLOPE,
 };
 use crate::surface_fit::joint::select::{Weighed, weigh};
 use crate::surface_fit::joint::solve::{JointFit, Schedule};
 use crate::surface_fit::solver::Fit;
+use crate::surface_fit::warm_start::LEAST_SHARE;
 
 /// From a wall that is known to a millimetre.
 const NEAR: Schedule = Schedule { annealed: 0, sketched: 0, pixels: 3 };
@@ -38,6 +39,10 @@ const PLAIN_TAU: f64 = 1.5e-3;
 const PLAIN_CORRELATION: f64 = 8.0;
 /// Most smooth tiles too steep for feed that no model explains, as a fraction of the wall's.
 const PLAIN_STEEP: f64 = 0.03;
+/// The same for a known wall: over the model error that it has shown before.
+const RELEARNED: f64 = 2.0;
+/// Fewest tiles of each part that show it again.
+const LEAST_AGAIN: f64 = 2.0;
 /// Feed lies less steep: the steepest drained angles of repose are 45°. Cosine of 48°.
 const STEEP_COSINE: f64 = 0.669;
 
@@ -68,9 +73,6 @@ pub fn state_of(fit: &Fit) -> JointState {
     state.reference = if state.has_cylinder && state.has_cone { state.joint().clamp(0.2, 60.0) } else { 1.0 };
     state
 }
-
-/// Column of the cylinder's ovality, the same at all heights: after the rings' 8 and the bend's 8.
-pub const OVAL_COLUMN: usize = CYLINDER_FORM + 16;
 
 /// Runs the fits: `near` is a wall found on tiles, `proposals` are rougher ones.
 pub fn search(
@@ -132,6 +134,26 @@ pub fn search(
         weighed = weigh(frame, &fits);
     }
     Search { weighed, fits }
+}
+
+/// The fit from the wall of another frame; `None` where this one does not plainly show it again.
+pub fn search_again(frame: &Frame, known: &Fit) -> Option<Search> {
+    let state = state_of(known);
+    let model = *Model::of(&state).first()?;
+    let fit = JointFit::start(model, state, known.misfit.max(2e-4)).run(frame, &NEAR)?;
+    let [cylinder, cone] = wall_tiles(&fit);
+    let most = (RELEARNED * known.misfit).max(PLAIN_TAU.min(1e-3 * fit.state.size()).max(3e-4));
+    let plain = fit.tau.iter().all(|tau| *tau < most) && fit.amplitudes.at_cap(fit.state.size()).is_none();
+    let shown = (cylinder >= LEAST_AGAIN || !fit.state.has_cylinder)
+        && (cone >= LEAST_AGAIN || !fit.state.has_cone)
+        && cylinder + cone > LEAST_SHARE * tiles_met(&fit);
+    let mut weighed = weigh(frame, std::slice::from_ref(&fit));
+    // of what model the vessel is the other frame has told
+    let agrees = weighed.first().is_some_and(|best| best.model == model);
+    weighed.truncate(1);
+    weighed.iter_mut().for_each(|best| best.probability = 1.0);
+    let again = plain && shown && agrees && steep_unexplained(frame, &fit) < PLAIN_STEEP;
+    again.then(|| Search { fits: vec![fit], weighed })
 }
 
 /// A cylinder that is known to a millimetre with the conical surface beside it: annealed, it would be taken for what

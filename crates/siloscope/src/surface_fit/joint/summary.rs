@@ -1,15 +1,12 @@
 //! What the joint fit says beside the wall.
 
 use crate::surface_fit::joint::answer::JointAnswer;
-use crate::surface_fit::joint::factor::JointFactor;
 
 /// What the joint fit says beside the wall.
 #[derive(Debug, Clone)]
 pub struct JointSummary {
     /// The answer with its models.
     pub answer: JointAnswer,
-    /// What the frame alone says.
-    pub factor: JointFactor,
     /// Model error of cylinder and cone, metres across the wall.
     pub tau: [f64; 2],
     /// Correlation factors of cylinder and cone.

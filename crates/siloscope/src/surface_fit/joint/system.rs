@@ -8,6 +8,11 @@ use nalgebra::{DMatrix, DVector};
 /// Widths of a part's rows.
 const WIDTHS: [usize; 2] = [CYLINDER_END, COMMON + SIZE - CYLINDER_END];
 
+/// Which of all parameters is a part's column `k`.
+pub fn column(part: Part, k: usize) -> usize {
+    if k < COMMON { k } else { own_columns(part) + k - COMMON }
+}
+
 /// Sum of squares ½ δᵀ H δ + gᵀ δ of a frame, over all parameters, without priors.
 #[derive(Debug, Clone)]
 pub struct Quadratic {
@@ -15,6 +20,37 @@ pub struct Quadratic {
     pub information: DMatrix<f64>,
     /// g, the gradient.
     pub gradient: DVector<f64>,
+    /// What of both the tiles of cylinder and cone say, each in its part's own columns.
+    pub parts: [PartSum; 2],
+}
+
+/// The sum of squares of one part's tiles, in the part's columns.
+#[derive(Debug, Clone, Default)]
+pub struct PartSum {
+    /// The information, row by row.
+    pub information: Vec<f64>,
+    /// The gradient.
+    pub gradient: Vec<f64>,
+}
+
+impl PartSum {
+    /// From the upper triangle of the information.
+    fn of_upper(mut information: Vec<f64>, gradient: Vec<f64>) -> Self {
+        let n = gradient.len();
+        for r in 0..n {
+            for c in 0..r {
+                information[r * n + c] = information[c * n + r];
+            }
+        }
+        Self { information, gradient }
+    }
+
+    fn shift(&mut self, step: impl Fn(usize) -> f64, factor: f64) {
+        let step: Vec<f64> = (0..self.gradient.len()).map(|k| factor * step(k)).collect();
+        for (g, row) in self.gradient.iter_mut().zip(self.information.chunks_exact(step.len())) {
+            *g += dot(row, &step);
+        }
+    }
 }
 
 /// Rows added up by part.
@@ -50,17 +86,17 @@ impl Accumulator {
         let mut information = DMatrix::zeros(SIZE, SIZE);
         let mut gradient = DVector::zeros(SIZE);
         for (p, part) in [Part::Cylinder, Part::Cone].into_iter().enumerate() {
-            let (width, own) = (WIDTHS[p], own_columns(part));
-            let column = |k: usize| if k < COMMON { k } else { own + k - COMMON };
+            let width = WIDTHS[p];
             for k in 0..width {
-                gradient[column(k)] += self.gradients[p][k];
+                gradient[column(part, k)] += self.gradients[p][k];
                 for l in k..width {
-                    information[(column(k), column(l))] += self.sums[p][k * width + l];
+                    information[(column(part, k), column(part, l))] += self.sums[p][k * width + l];
                 }
             }
         }
         information.fill_lower_triangle_with_upper_triangle();
-        Quadratic { information, gradient }
+        let parts = [0, 1].map(|p| PartSum::of_upper(self.sums[p].clone(), self.gradients[p].clone()));
+        Quadratic { information, gradient, parts }
     }
 }
 
@@ -90,8 +126,20 @@ pub struct Posterior {
 impl Quadratic {
     /// Moves the point about which the gradient is by a multiple of a step.
     pub fn shift(&mut self, step: &[f64; SIZE], factor: f64) {
+        for (part, sum) in [Part::Cylinder, Part::Cone].into_iter().zip(&mut self.parts) {
+            sum.shift(|k| step[column(part, k)], factor);
+        }
         let step = DVector::from_row_slice(step) * factor;
         self.gradient += &self.information * step;
+    }
+
+    /// So many times what it says; of both parts together alone.
+    pub fn times(&self, factor: f64) -> Self {
+        Self {
+            information: &self.information * factor,
+            gradient: &self.gradient * factor,
+            parts: [PartSum::default(), PartSum::default()],
+        }
     }
 
     /// Posterior with a prior, from a linearisation point; `None` where the equations are not finite.
