@@ -199,6 +199,7 @@ def test_most_frames_are_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     searched: list[bool] = []
 
     def watched(*given: Any, **named: Any) -> Estimate:
+        named["vessels"] = "coaxial"
         estimate = locate(*given, **named)
         searched.append(is_searched(estimate, locate(*given, **{**named, "start": None})))
         return estimate
