@@ -195,6 +195,25 @@ def test_a_calibration_says_what_its_frames_say_from_nothing(monkeypatch: pytest
     np.testing.assert_allclose(np.diag(found.parameter_covariance), std**2, rtol=0.05)
 
 
+def test_a_calibration_of_a_coaxial_vessel_says_so_and_goes_on_with_it() -> None:
+    told = calibrate(sequence()[1:5], sensor=PROFILE, vessels="coaxial")
+    more = calibrate(sequence()[6:8], continue_from=told)
+    assert told.config["vessels"] == more.config["vessels"] == "coaxial"
+    assert more.counts["used"] == 6
+    alone = calibrate([locate(each, sensor=PROFILE) for each in sequence()[1:5]])
+    assert gap_of_poses(told, alone) < 0.1
+    with pytest.raises(siloscope.errors.UsageError, match="vessels"):
+        calibrate(sequence()[1:2], vessels="round")
+
+
+def gap_of_poses(one: Calibration, other: Calibration) -> float:
+    assert one.pose is not None
+    assert other.pose is not None
+    assert one.covariance is not None
+    steps = [getattr(one.pose, name) - getattr(other.pose, name) for name in ("r_x", "r_y", "t_x", "t_y")]
+    return float((np.abs(steps) / np.sqrt(np.diag(one.covariance))).max())
+
+
 def test_most_frames_are_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     searched: list[bool] = []
 

@@ -38,11 +38,12 @@ class Settings:
 def settings_of(before: Calibration | None, **given: Any) -> Settings:
     """The caller's settings; those of the earlier calibration where the caller says nothing."""
     profile = sensors.load(given["sensor"])
-    mine = Settings(profile, given["diameter"], given["gravity"], given["intrinsics"])
+    vessels = given["vessels"]
+    mine = Settings(profile, given["diameter"], given["gravity"], given["intrinsics"], vessels or "any")
     if before is None or not before.config:
         return mine
     earlier = before.config
-    mine = replace(mine, vessels=earlier.get("vessels") or "any")
+    mine = replace(mine, vessels=vessels or earlier.get("vessels") or "any")
     if given["sensor"] is None:
         mine = replace(mine, profile=_profile(earlier.get("sensor")))
     if given["diameter"] is None:
