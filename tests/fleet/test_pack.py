@@ -126,7 +126,7 @@ def test_several_silos_are_told_apart(source: Path, tmp_path: Path) -> None:
     pack([source, other], tmp_path / "store", shard_frames=8)
     with siloscope.open(tmp_path / "store", stream="silo=b/") as sealed:
         assert len(sealed) == 3
-    with siloscope.open(tmp_path / "store") as several, pytest.raises(InputError, match="choose one with --stream"):
+    with siloscope.open(tmp_path / "store") as several, pytest.raises(InputError, match="choose one with stream"):
         list(several)
     assert main(["info", str(tmp_path / "store")]) == 0
     with pytest.raises(InputError, match="none named 'silo=c'"):
@@ -198,7 +198,7 @@ def test_what_can_not_be_sealed_is_refused(source: Path, tmp_path: Path) -> None
     store = tmp_path / "store"
     pack([source], store)
     archive.write(tmp_path / "other.zarr", [replace(frames(1)[0], depth_unit=0.00025)])
-    with pytest.raises(InputError, match="seal it under another --camera-id"):
+    with pytest.raises(InputError, match="seal it under another camera_id"):
         pack([tmp_path / "other.zarr"], store, silo="silo-7")
     with pytest.raises(UsageError, match="an id has letters"):
         pack([source], store, silo="a/b")
