@@ -24,10 +24,10 @@ const BELOW: [f64; 3] = [0.0, 0.5, 1.0];
 /// Step of the differences, metres.
 const STEP: f64 = 1e-5;
 
-/// Widens a covariance of all parameters by it.
-pub fn widen(state: &JointState, mean: &DVector<f64>, covariance: &mut DMatrix<f64>) {
+/// Widens a covariance of all parameters by it; the form runs from the camera's height to the height `reference`.
+pub fn widen(state: &JointState, reference: f64, mean: &DVector<f64>, covariance: &mut DMatrix<f64>) {
     if state.has_cylinder {
-        let (pose, radius) = (axis(state, mean, covariance), rings(mean, covariance));
+        let (pose, radius) = (axis(state, reference, mean, covariance), rings(mean, covariance));
         covariance.view_mut((0, 0), (4, 4)).add_assign(pose);
         covariance[(RADIUS, RADIUS)] += radius;
     }
@@ -40,11 +40,11 @@ fn rings(mean: &DVector<f64>, covariance: &DMatrix<f64>) -> f64 {
 }
 
 /// Covariance that the bend adds to the pose.
-fn axis(state: &JointState, mean: &DVector<f64>, covariance: &DMatrix<f64>) -> Matrix4<f64> {
+fn axis(state: &JointState, reference: f64, mean: &DVector<f64>, covariance: &DMatrix<f64>) -> Matrix4<f64> {
     let c = Vector4::from_fn(|k, _| mean[CYLINDER_FORM + BEND[k]]);
     let moment =
         c * c.transpose() + Matrix4::from_fn(|i, j| covariance[(CYLINDER_FORM + BEND[i], CYLINDER_FORM + BEND[j])]);
-    let [shift, turn] = moved(&state.pose(), state.reference);
+    let [shift, turn] = moved(&state.pose(), reference);
     let below = if state.has_cone { &BELOW[..1] } else { &BELOW };
     let mut sum = Matrix4::zeros();
     for above in [-ABOVE, ABOVE] {

@@ -93,7 +93,7 @@ pub fn averaged(frame: &Frame, fits: &[JointFit], weighed: &[Weighed], exact_cam
         let mean = ideal_mean(frame, fit, w.model, &posterior).unwrap_or_else(|| wide.clone());
         let off = &mean - &wide;
         let mut covariance = posterior.covariance();
-        form_share::widen(&fit.state, &wide, &mut covariance);
+        form_share::widen(&fit.state, fit.state.reference, &wide, &mut covariance);
         parts.push((w.probability, mean, covariance + &off * off.transpose()));
     }
     let total: f64 = parts.iter().map(|p| p.0).sum();
