@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import binascii
 import hashlib
 import math
 from collections.abc import Iterator
@@ -49,11 +51,21 @@ def _number(value: Any) -> Any:
 
 def _values(value: Any) -> Any:
     """The leaves below a key that are not null: numbers by size, and how often every text stands there."""
-    leaves = [leaf for leaf in _leaves(value) if leaf is not None]
+    leaves = [number for leaf in _leaves(value) if leaf is not None for number in _unpacked(leaf)]
     numbers = sorted(leaf for leaf in leaves if isinstance(leaf, float | int) and not isinstance(leaf, bool))
     rest = sorted(str(leaf) for leaf in leaves if not isinstance(leaf, float | int) or isinstance(leaf, bool))
     texts = {text: rest.count(text) for text in dict.fromkeys(rest)}
     return {"numbers": digest(numbers) if len(numbers) > LONGEST else numbers, "texts": texts}
+
+
+def _unpacked(leaf: Any) -> list[Any]:
+    """The numbers of a packed vector; any other leaf as it is."""
+    if not isinstance(leaf, str) or len(leaf) <= LONGEST:
+        return [leaf]
+    try:
+        return np.frombuffer(base64.b64decode(leaf, validate=True), "<f8").tolist()
+    except (binascii.Error, ValueError):
+        return [leaf]
 
 
 def _leaves(value: Any) -> Iterator[Any]:
