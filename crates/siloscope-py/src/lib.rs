@@ -11,6 +11,7 @@ mod content;
 mod convert;
 mod depth;
 mod files;
+mod frame_factor;
 mod fusion;
 mod inputs;
 mod outcome;
@@ -29,6 +30,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     depth::register(m)?;
     content::register(m)?;
     files::register(m)?;
+    frame_factor::register(m)?;
     fusion::register(m)?;
     outcome::register(m)?;
     scene::register(m)?;

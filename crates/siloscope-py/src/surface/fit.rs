@@ -2,7 +2,7 @@
 
 use super::warm_start::WarmStart;
 use crate::arrays::{matrix, vectors};
-use crate::fusion::FrameFactor;
+use crate::frame_factor::FrameFactor;
 use crate::inputs::DepthFrame;
 use crate::outcome::{StageTime, stages};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
