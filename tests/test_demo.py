@@ -89,7 +89,9 @@ def test_place_that_cannot_be_written_is_wrong_usage(tmp_path: Path, capsys: pyt
 def test_its_calibration_can_be_continued(done: Done, tmp_path: Path) -> None:
     frame, calibration = str(done[0] / "frame.png"), str(done[0] / "calibration.json")
     assert main(["calibrate", frame, "--continue", calibration, "-o", str(tmp_path / "silo.json")]) == 0
-    assert Calibration.load(tmp_path / "silo.json").counts["used"] == 4
+    before = Calibration.load(calibration).counts["used"]
+    assert before >= 2
+    assert Calibration.load(tmp_path / "silo.json").counts["used"] == before + 1
 
 
 def test_a_discharge_without_an_answer_has_a_page_too(tmp_path: Path) -> None:

@@ -99,7 +99,7 @@ def _step(seen: SimulatedFrame) -> Step:
     estimates, milliseconds = {}, {}
     for method in METHODS:
         start = time.perf_counter()
-        estimates[method] = siloscope.locate(seen.frame(), method=method, sensor=_sensor(method), vessels="coaxial")
+        estimates[method] = siloscope.locate(seen.frame(), method=method, sensor=_sensor(method))
         milliseconds[method] = 1e3 * (time.perf_counter() - start)
     return Step(seen, estimates, milliseconds, {name: _distance(seen, made) for name, made in estimates.items()})
 

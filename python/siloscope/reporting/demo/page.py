@@ -184,6 +184,8 @@ def _meaning(steps: Sequence[Step]) -> list[str]:
             "millimetres, holes and flying pixels. The surface fit is told that profile; the six steps of the paper "
             f"take the cloud as it is, and the sensor's bias, {_bias_at_the_vertex()} at the cone's vertex, is in "
             "their answer.",
+            "The camera's focal lengths and principal point are exact here, and are taken as a calibrated camera's: "
+            "what such a camera leaves open is most of every deviation stated above; the errors are smaller.",
             "A simulated silo is rounder and cleaner than a real one. Dents, ladders and dust make a real answer less "
             "exact than this page.",
         )
