@@ -94,6 +94,7 @@ def test_its_calibration_can_be_continued(done: Done, tmp_path: Path) -> None:
     assert Calibration.load(tmp_path / "silo.json").counts["used"] == before + 1
 
 
-def test_a_discharge_without_an_answer_has_a_page_too(tmp_path: Path) -> None:
-    assert main(["demo", "--out", str(tmp_path), "--steps", "1"]) == 0
+@pytest.mark.parametrize("steps", [1, 2, 3])
+def test_a_discharge_with_hardly_an_answer_has_a_page_too(steps: int, tmp_path: Path) -> None:
+    assert main(["demo", "--out", str(tmp_path), "--steps", str(steps)]) == 0
     assert "refused" in (tmp_path / "report.html").read_text("utf-8")

@@ -25,10 +25,11 @@ def section(steps: Sequence[Step], found: Sequence[Content]) -> list[str]:
     if not told:
         return [text("No frame has a volume: no calibration, or the cone was never seen.")]
     rows = [_row(step, content) for step, content in told[:: max(1, len(told) // SHOWN)]]
-    middle = told[len(told) // 2][1]
+    drawn = [content for _, content in told if content.surface is not None]  # an empty silo has none
+    body = [] if not drawn else [plots.png(surface_3d(drawn[len(drawn) // 2]), dpi=_DPI)]
     volume, std = (np.array([np.nan if v is None else v for v in values]) for values in zip(
         *((content.volume, content.volume_std) for content in found), strict=True))  # fmt: skip
-    story = trend(list(range(len(found))), volume, std, capacity=middle.capacity, label="frame")
+    story = trend(list(range(len(found))), volume, std, capacity=told[0][1].capacity, label="frame")
     return [
         text(
             "With the calibration, even a full silo's frame tells what is in it: the content's surface is mapped, "
@@ -36,7 +37,7 @@ def section(steps: Sequence[Step], found: Sequence[Content]) -> list[str]:
             "unseen leave open. The mass is that of wheat."
         ),
         table(["level", "measured", "truth", "off by", "mass"], rows),
-        picture(plots.png(surface_3d(middle), dpi=_DPI), "The content of one frame in the cut-open silo.", True),
+        *(picture(png, "The content of one frame in the cut-open silo.", True) for png in body),
         picture(plots.png(story, dpi=_DPI), "The volume in every frame of the discharge."),
     ]
 
