@@ -38,6 +38,16 @@ def story(volumes: list[float | None], hours: float = 1.0, noise: float = 0.002)
     return track_of(readings, capacity=10.0)
 
 
+def test_what_readings_share_grows_with_the_volume_and_stays_in_a_difference() -> None:
+    """A radius that is off by 1 % makes each volume off by 2 %, and their difference too."""
+    volume = np.array([10.0, 10.0, 4.0, 4.0])
+    own, shared = np.full(4, 0.003), 0.02 * volume
+    (alone,) = events(np.arange(4.0), volume, own)
+    (whole,) = events(np.arange(4.0), volume, own, std=np.hypot(own, shared))
+    assert alone.volume_std == alone.own_std == whole.own_std == pytest.approx(0.003 * np.sqrt(2.0))
+    assert whole.volume_std == pytest.approx(np.hypot(0.003 * np.sqrt(2.0), 0.02 * 6.0))
+
+
 def test_a_quiet_silo_has_no_events() -> None:
     draw = np.random.default_rng(0)
     assert story(list(5.0 + 0.002 * draw.standard_normal(200))).events == ()

@@ -172,7 +172,7 @@ def _packing(matches: Sequence[Match], volumes: Mapping[int, float]) -> Packing 
         return None
     first, last = (np.array([volumes[getattr(m.event, end)] for m in known]) for end in ("first", "last"))
     mass = np.array([math.copysign(m.mass, b - a) for m, a, b in zip(known, first, last, strict=True)])
-    std = np.array([m.mass * math.hypot(m.mass_std / m.mass, m.event.volume_std / m.event.volume) for m in known])
+    std = np.array([m.mass * math.hypot(m.mass_std / m.mass, _own_std(m.event) / m.event.volume) for m in known])
     most = float(max(first.max(), last.max()))
     columns = np.column_stack([last - first, (last**2 - first**2) / most])
     weighed, values = columns / std[:, None], mass / std
@@ -221,7 +221,7 @@ def _match(event: Event, tickets: tuple[Ticket, ...], scale_std: float) -> Match
 def _mean(matches: Sequence[Match]) -> tuple[float, float, list[float]]:
     """Density, its deviation, and how far each match is off the mean of the others, in deviations."""
     values = np.array([match.density for match in matches])
-    own = np.array([m.density * math.hypot(m.mass_std / m.mass, m.event.volume_std / m.event.volume) for m in matches])
+    own = np.array([m.density * math.hypot(m.mass_std / m.mass, _own_std(m.event) / m.event.volume) for m in matches])
     middle = float(np.median(values))
     scatter = 1.4826 * float(np.median(np.abs(values - middle)))
     spread = math.sqrt(max(scatter**2 - float(np.median(own)) ** 2, 0.0))
@@ -229,6 +229,11 @@ def _mean(matches: Sequence[Match]) -> tuple[float, float, list[float]]:
     mean = float((weight * values).sum() / weight.sum())
     deviations = np.abs(values - middle) / np.sqrt(own**2 + spread**2)
     return mean, float(weight.sum() ** -0.5), deviations.tolist()
+
+
+def _own_std(event: Event) -> float:
+    """What differs from event to event; what all share is an error of the density that they give."""
+    return event.volume_std if event.own_std is None else event.own_std
 
 
 def _with(match: Match, deviation: float) -> Match:

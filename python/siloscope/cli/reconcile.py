@@ -69,12 +69,10 @@ def _story(path: Path) -> tuple[list[Event], dict[int, float]]:
         document = json.loads(path.read_bytes())
         if document["schema"] != TRACK:
             raise InputError(f"{path}: no track of the schema {TRACK}; give what `siloscope track --json` printed")
-        events = [
-            Event(
-                e["kind"], e["first"], e["last"], e["start"], e["end"], e["volume_m3"], e["volume_std_m3"], e["mass_kg"]
-            )
-            for e in document["events"]
-        ]
+        names = ("kind", "first", "last", "start", "end", "volume_m3", "volume_std_m3", "mass_kg")
+        fields = {name: name.removesuffix("_m3").removesuffix("_kg") for name in names}
+        told = [{field: e[name] for name, field in fields.items()} for e in document["events"]]
+        events = [Event(**e, own_std=o.get("own_std_m3")) for e, o in zip(told, document["events"], strict=True)]
         readings = document.get("readings", ())
         return events, {r["index"]: float(r["volume_m3"]) for r in readings if r["volume_m3"] is not None}
     except OSError as error:

@@ -67,7 +67,7 @@ def told(series: Series) -> tuple[tuple[Event, ...], Series]:
     keep = ~apart
     columns = {name: getattr(series, name)[keep] for name in COLUMNS}
     kept = replace(series, **columns)
-    found = events(kept.time, kept.stock, kept.own, capacity=kept.capacity, mass=kept.mass)
+    found = events(kept.time, kept.stock, kept.own, std=kept.std, capacity=kept.capacity, mass=kept.mass)
     return found, kept
 
 

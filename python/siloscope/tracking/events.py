@@ -23,6 +23,7 @@ def events(
     volume: ArrayLike,
     own_std: ArrayLike,
     *,
+    std: ArrayLike | None = None,
     capacity: float | None = None,
     mass: ArrayLike | None = None,
 ) -> tuple[Event, ...]:
@@ -35,8 +36,11 @@ def events(
     volume : array (N,)
         m³.
     own_std : array (N,)
-        The part of each volume's standard deviation that differs from reading to reading, m³ (`Content.own_std`): what
-        all readings of one calibration share drops out of a difference. NaN where not known.
+        The part of each volume's standard deviation that differs from reading to reading, m³ (`Content.own_std`). NaN
+        where not known.
+    std : array (N,), optional
+        The whole of it, m³. What all readings of one calibration share, such as the radius' error, grows with the
+        volume: of a difference it leaves the difference. Without it nothing is shared.
     capacity : float, optional
         Of the silo, m³: changes below `TURN_FRACTION` of it are no events.
     mass : array (N,), optional
@@ -48,6 +52,7 @@ def events(
         `first` and `last` are places in these arrays.
     """
     times, volumes, own = (np.asarray(values, np.float64) for values in (time, volume, own_std))
+    shared = np.zeros(len(volumes)) if std is None else np.sqrt(np.maximum(np.square(std) - own**2, 0.0))
     masses = np.full(len(volumes), np.nan) if mass is None else np.asarray(mass, np.float64)
     if len(volumes) < 2:
         return ()
@@ -55,13 +60,16 @@ def events(
     found = []
     for turn, next_turn in legs(volumes, least):
         first, last = _trimmed(volumes, turn, next_turn, 0.1 * float(min(least[turn], least[next_turn])))
-        amount, std = float(volumes[last] - volumes[first]), float(np.hypot(own[first], own[last]))
-        std = std if math.isfinite(std) else float(np.hypot(least[first], least[last])) / TURN_SIGMAS
+        amount, alone = float(volumes[last] - volumes[first]), float(np.hypot(own[first], own[last]))
+        alone = alone if math.isfinite(alone) else float(np.hypot(least[first], least[last])) / TURN_SIGMAS
+        common = float(shared[last] - shared[first])
+        whole = math.hypot(alone, common) if math.isfinite(common) else alone
         kind = "refill" if amount > 0.0 else "withdrawal"
         known = last if kind == "refill" else first
         moved = abs(amount) * float(masses[known]) / float(volumes[known]) if volumes[known] else math.nan
         start, end = (None if math.isnan(t) else float(t) for t in (times[first], times[last]))
-        found.append(Event(kind, first, last, start, end, abs(amount), std, None if math.isnan(moved) else moved))
+        weight = None if math.isnan(moved) else moved
+        found.append(Event(kind, first, last, start, end, abs(amount), whole, weight, alone))
     return tuple(found)
 
 

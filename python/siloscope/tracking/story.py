@@ -85,7 +85,7 @@ def track_of(
     kept = [k for k, out in zip(answered, apart, strict=True) if not out]
     time, amount, std, own, density = (values[~apart] for values in (time, amount, std, own, density))
     still = without_steps(amount, std, [MOVED in readings[k].quality for k in kept])
-    found = events(time, still, own, capacity=capacity, mass=still * density)
+    found = events(time, still, own, std=std, capacity=capacity, mass=still * density)
     told = _told(readings, stock, {k for k, out in zip(answered, apart, strict=True) if out})
     unread = tuple(Reading(len(told) + i, cause, None, "unreadable", cause) for i, cause in enumerate(problems))
     used = use(time, still - (0.0 if basis == "volume" else still.min(initial=0.0)), std, found)

@@ -101,6 +101,8 @@ class Event:
     volume_std: float
     mass: float | None = None
     """Amount, kg."""
+    own_std: float | None = None
+    """The part of the deviation that is this event's alone, m³; the rest all events of a calibration share."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -114,6 +116,7 @@ class Event:
             "end_utc": utc(self.end),
             "volume_m3": self.volume,
             "volume_std_m3": self.volume_std,
+            "own_std_m3": self.own_std,
             "mass_kg": self.mass,
         }
 
