@@ -108,6 +108,8 @@ def shot(browser: Browser, address: str, selector: str, size: Any, theme: Any) -
     page = context.new_page()
     page.goto(address)
     page.wait_for_selector(selector, timeout=90_000)
+    if "canvas" in selector and size is PHONE:
+        page.locator(selector).evaluate("canvas => canvas.scrollIntoView({ block: 'center' })")
     page.wait_for_timeout(2500)
     taken = page.screenshot()
     context.close()
