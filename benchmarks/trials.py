@@ -42,6 +42,8 @@ class Knowledge:
     name: str
     profile: str | SensorProfile | None
     diameter: bool = False
+    exact: bool = False
+    """Whether the intrinsics are told to be exact."""
 
     def locate(self, frame: SimulatedFrame) -> Estimate:
         """The answer for a simulated frame."""
@@ -56,7 +58,8 @@ class Knowledge:
         return replace(self, profile=profile if self.profile else None)
 
     def _of(self, scene: Scene) -> dict[str, Any]:
-        return {"sensor": self.profile, "diameter": 2.0 * scene.silo.radius if self.diameter else None}
+        diameter = 2.0 * scene.silo.radius if self.diameter else None
+        return {"sensor": self.profile, "diameter": diameter, "intrinsics": "exact" if self.exact else None}
 
 
 KNOWN = Knowledge("profile known", "orbbec-astra-s")
