@@ -3,12 +3,12 @@
 use crate::fusion::common::{Common, fused};
 use crate::fusion::earlier::Earlier;
 use crate::fusion::moves::{Move, find_moves};
-use crate::fusion::solve::{Average, System, probabilities};
+use crate::fusion::solve::{System, probabilities};
 use crate::fusion::sum::Sum;
 use crate::surface_fit::frame_factor::{FrameFactor, Kind};
 use crate::surface_fit::joint::answer::coaxial;
+use crate::surface_fit::joint::average::Average;
 use crate::surface_fit::joint::form::Form;
-use crate::surface_fit::joint::form_share;
 use crate::surface_fit::joint::model::{HOPPER_SLOPE, Model};
 use crate::surface_fit::joint::parameters::{CAMERA, SLOPE};
 
@@ -65,9 +65,9 @@ fn told(frames: &[FrameFactor], earlier: Option<&Earlier>, common: &Common) -> O
     let system = System { quadratic: &quadratic, state: &common.state, inputs: &common.inputs, form: &form };
     let models = system.models();
     let weighed: Vec<_> = models.iter().zip(probabilities(&models)).collect();
-    let average = widened(common, system.averaged(&weighed, false)?);
+    let average = system.averaged(&weighed, common.heights.form, false)?;
     let exact = common.inputs.camera_std == [0.0; 5];
-    let relative = if exact { average.clone() } else { widened(common, system.averaged(&weighed, true)?) };
+    let relative = if exact { average.clone() } else { system.averaged(&weighed, common.heights.form, true)? };
     let best = models.first()?;
     let cone = matches!(best.model, Model::CoaxialCone | Model::ConeAlone);
     let hopper = best.model == Model::ConeAlone || cone && is_hopper(frames, earlier, common, &average);
@@ -76,12 +76,6 @@ fn told(frames: &[FrameFactor], earlier: Option<&Earlier>, common: &Common) -> O
     let told = weighed.iter().map(|(solved, p)| (solved.model, *p)).collect();
     let deformed = best.amplitudes.at_cap(common.state.size()).is_some();
     Some(Told { answer, hopper, models: told, camera, deformed })
-}
-
-/// With what the common wall's form leaves open of axis and radius.
-fn widened(common: &Common, mut average: Average) -> Average {
-    form_share::widen(&common.state, common.heights.form, &average.mean, &mut average.covariance);
-    average
 }
 
 /// Whether the common cone is the silo's own: steeper than feed lies, or a frame has seen feed in it.

@@ -1,15 +1,14 @@
 //! The sum of the frames solved for every vessel model, with the form's amplitudes learned on it.
 
+use crate::surface_fit::joint::average::{self, Average, Candidate};
 use crate::surface_fit::joint::form::Form;
 use crate::surface_fit::joint::model::{Amplitudes, Inputs, Model, prior};
-use crate::surface_fit::joint::parameters::{CAMERA, JointState, SIZE};
+use crate::surface_fit::joint::parameters::JointState;
 use crate::surface_fit::joint::system::{Posterior, Prior, Quadratic};
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 
 /// How often amplitudes are learned.
 const LEARNED: usize = 5;
-/// Models less probable than this leave the answer as it is.
-const NEGLIGIBLE: f64 = 1e-4;
 
 /// A model solved.
 #[derive(Debug, Clone)]
@@ -91,51 +90,18 @@ impl System<'_> {
         found
     }
 
-    /// Mean and covariance over the models: Σ p (C + d dᵀ), d the distance of a model's mean.
-    ///
-    /// Where the evidence prefers an ideal vessel, the mean is that of one; the covariance is always that of a usual one. With `exact` intrinsics it is that of poses of one camera to each other.
-    pub fn averaged(&self, models: &[(&Solved, f64)], exact: bool) -> Option<Average> {
-        let mut parts = Vec::new();
-        for (solved, probability) in models.iter().filter(|(_, probability)| *probability > NEGLIGIBLE) {
-            let mut prior = self.prior(solved.model, &solved.amplitudes);
-            if exact {
-                prior.std[CAMERA..][..5].fill(0.0);
-            }
-            let wide = self.quadratic.posterior(&self.state.x, &prior)?;
-            let at = |p: &Posterior| DVector::from_fn(SIZE, |k, _| self.state.x[k] + p.step[k]);
-            let mean = self.ideal(solved, &wide).map_or_else(|| at(&wide), |ideal| at(&ideal));
-            let off = &mean - at(&wide);
-            parts.push((*probability, mean, wide.covariance() + &off * off.transpose()));
-        }
-        let total: f64 = parts.iter().map(|p| p.0).sum();
-        let first = parts.first()?.1.clone();
-        let mean =
-            parts.iter().fold(DVector::zeros(SIZE), |sum, (p, mean, _)| sum + (mean - &first) * (*p / total)) + &first;
-        let covariance = parts.iter().fold(DMatrix::zeros(SIZE, SIZE), |sum, (p, of, covariance)| {
-            let off = of - &mean;
-            sum + (covariance + &off * off.transpose()) * (*p / total)
-        });
-        Some(Average { mean, covariance })
-    }
-
-    /// A vessel as good as ideal, in its wall's form, its cone's place, or both, where the evidence prefers it.
-    fn ideal(&self, solved: &Solved, wide: &Posterior) -> Option<Posterior> {
-        let size = self.state.size();
-        let learned = solved.amplitudes.log_prior(size);
-        let mut best = (wide.log_evidence + learned, None);
-        for (form, cone) in [(true, true), (true, false), (false, true)] {
-            let (amplitudes, own) =
-                if form { (solved.amplitudes.ideal(size), 0.0) } else { (solved.amplitudes, learned) };
-            let mut prior = self.prior(solved.model, &amplitudes);
-            if cone && self.state.has_cone {
-                solved.model.place_cone(&mut prior, size, true);
-            }
-            let posterior = self.quadratic.posterior(&self.state.x, &prior)?;
-            if posterior.log_evidence + own > best.0 {
-                best = (posterior.log_evidence + own, Some(posterior));
-            }
-        }
-        best.1
+    /// Mean and covariance over the models; the form ends at the height `reference`.
+    pub fn averaged(&self, models: &[(&Solved, f64)], reference: f64, exact: bool) -> Option<Average> {
+        let candidate = |(solved, probability): &(&Solved, f64)| Candidate {
+            model: solved.model,
+            probability: *probability,
+            quadratic: self.quadratic,
+            state: self.state,
+            amplitudes: solved.amplitudes,
+            reference,
+        };
+        let candidates: Vec<Candidate> = models.iter().map(candidate).collect();
+        average::averaged(&candidates, self.inputs, self.form, exact)
     }
 }
 
@@ -145,13 +111,4 @@ pub fn probabilities(models: &[Solved]) -> Vec<f64> {
     let weights: Vec<f64> = models.iter().map(|m| (m.log_evidence - most).exp()).collect();
     let total: f64 = weights.iter().sum();
     weights.iter().map(|w| w / total).collect()
-}
-
-/// The averaged parameters.
-#[derive(Debug, Clone)]
-pub struct Average {
-    /// Mean.
-    pub mean: DVector<f64>,
-    /// Covariance.
-    pub covariance: DMatrix<f64>,
 }

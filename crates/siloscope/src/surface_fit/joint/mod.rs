@@ -6,6 +6,7 @@
 //! 4. `answer`: refusals, and the answer in the parameters that frames share.
 
 pub mod answer;
+pub mod average;
 pub mod correlation;
 pub mod ends;
 pub mod factor;

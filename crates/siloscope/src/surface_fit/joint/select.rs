@@ -1,13 +1,11 @@
 //! Models weighed against each other by Laplace evidence, and the answer averaged over them.
 
 use crate::geometry::surface::Part;
-use crate::surface_fit::joint::form_share;
+use crate::surface_fit::joint::average::{self, Average, Candidate};
 use crate::surface_fit::joint::frame::Frame;
-use crate::surface_fit::joint::model::{Model, prior};
-use crate::surface_fit::joint::parameters::{CAMERA, SIZE};
+use crate::surface_fit::joint::model::Model;
+use crate::surface_fit::joint::parameters::SIZE;
 use crate::surface_fit::joint::solve::JointFit;
-use crate::surface_fit::joint::system::Posterior;
-use nalgebra::{DMatrix, DVector};
 
 /// A model's log evidence and what it says.
 #[derive(Debug, Clone)]
@@ -72,69 +70,19 @@ fn common_factors(fits: &[JointFit]) -> Vec<f64> {
     factors
 }
 
-/// Models less probable than this leave the answer as it is.
-pub const NEGLIGIBLE: f64 = 1e-4;
-
-/// Mean and covariance of the parameters over the models: Σ w (C + d dᵀ), d the distance of a model's mean.
-///
-/// The cone's own parameters are averaged over the models that have one. Where the evidence prefers an ideal vessel, the
-/// mean is that of one. The covariance is always that of a usual one: what a frame does not show may
-/// still be there.
+/// Mean and covariance of the parameters over a frame's models.
 pub fn averaged(frame: &Frame, fits: &[JointFit], weighed: &[Weighed], exact_camera: bool) -> Option<Average> {
-    let mut parts = Vec::new();
-    for w in weighed.iter().filter(|w| w.probability > NEGLIGIBLE) {
+    let candidate = |w: &Weighed| {
         let fit = fits.get(w.fit)?;
-        let mut prior = fit.prior(frame, w.model);
-        if exact_camera {
-            prior.std[CAMERA..][..5].fill(0.0);
-        }
-        let posterior = fit.quadratic.posterior(&fit.state.x, &prior)?;
-        let wide = at(fit, &posterior);
-        let mean = ideal_mean(frame, fit, w.model, &posterior).unwrap_or_else(|| wide.clone());
-        let off = &mean - &wide;
-        let mut covariance = posterior.covariance();
-        form_share::widen(&fit.state, fit.state.reference, &wide, &mut covariance);
-        parts.push((w.probability, mean, covariance + &off * off.transpose()));
-    }
-    let total: f64 = parts.iter().map(|p| p.0).sum();
-    let first = parts.first()?.1.clone();
-    let mean =
-        parts.iter().fold(DVector::zeros(SIZE), |sum, (w, mean, _)| sum + (mean - &first) * (*w / total)) + &first;
-    let covariance = parts.iter().fold(DMatrix::zeros(SIZE, SIZE), |sum, (w, of, covariance)| {
-        let off = of - &mean;
-        sum + (covariance + &off * off.transpose()) * (*w / total)
-    });
-    Some(Average { mean, covariance })
-}
-
-fn at(fit: &JointFit, posterior: &Posterior) -> DVector<f64> {
-    DVector::from_fn(SIZE, |i, _| fit.state.x[i] + posterior.step[i])
-}
-
-/// Mean of a vessel that is as good as ideal, in its wall's form, its cone's place, or both, where the evidence prefers it.
-fn ideal_mean(frame: &Frame, fit: &JointFit, model: Model, wide: &Posterior) -> Option<DVector<f64>> {
-    let size = fit.state.size();
-    let learned = fit.amplitudes.log_prior(size);
-    let mut best = (wide.log_evidence + learned, None);
-    for (form, cone) in [(true, true), (true, false), (false, true)] {
-        let (amplitudes, own) = if form { (fit.amplitudes.ideal(size), 0.0) } else { (fit.amplitudes, learned) };
-        let mut prior = prior(model, &fit.state, frame.inputs, frame.form, Some(&amplitudes));
-        if cone && fit.state.has_cone {
-            model.place_cone(&mut prior, size, true);
-        }
-        let posterior = fit.quadratic.posterior(&fit.state.x, &prior)?;
-        if posterior.log_evidence + own > best.0 {
-            best = (posterior.log_evidence + own, Some(at(fit, &posterior)));
-        }
-    }
-    best.1
-}
-
-/// The averaged parameters.
-#[derive(Debug, Clone)]
-pub struct Average {
-    /// Mean.
-    pub mean: DVector<f64>,
-    /// Covariance.
-    pub covariance: DMatrix<f64>,
+        Some(Candidate {
+            model: w.model,
+            probability: w.probability,
+            quadratic: &fit.quadratic,
+            state: &fit.state,
+            amplitudes: fit.amplitudes,
+            reference: fit.state.reference,
+        })
+    };
+    let candidates: Option<Vec<Candidate>> = weighed.iter().map(candidate).collect();
+    average::averaged(&candidates?, frame.inputs, frame.form, exact_camera)
 }
