@@ -6,7 +6,7 @@ import { change } from "./data/client.ts";
 import { follow, type Link } from "./data/live.ts";
 import { changed, refreshAll, useResource } from "./data/resources.ts";
 import { type Language, load, remember, type Texts, WordsContext, words } from "./i18n/index.ts";
-import { Lost } from "./parts/lost.tsx";
+import { Lost, Short } from "./parts/lost.tsx";
 import { LanguageContext } from "./parts/preferences.tsx";
 import { Top } from "./parts/top.tsx";
 import { Waiting } from "./parts/waiting.tsx";
@@ -46,7 +46,7 @@ export function App({ start }: { start: Spoken }) {
 /** Asks who looks, and shows the login where the server wants one. */
 function Entrance() {
   const route = useRoute();
-  const site = useResource<Site>("site", "session");
+  const site = useResource<Site>("site", "session", "site");
   const again = useCallback(() => changed(() => true), []);
   if (route.view === "welcome") return <Welcome secret={route.secret} />;
   if (site.problem?.status === 401) return <Login entered={again} />;
@@ -68,6 +68,7 @@ function Inside({ route, site }: { route: Route; site: Site }) {
     <SurroundingsContext.Provider value={around}>
       {route.view !== "install" && <Top route={route} firing={firing} />}
       {link === "lost" && <Lost />}
+      {site.disk_short && <Short site={site} />}
       <View route={route} role={site.role} />
     </SurroundingsContext.Provider>
   );

@@ -104,7 +104,15 @@ test("no line bridges a gap, the band is two deviations wide, the forecast falls
 
 test("use counts falls, not refills and not gaps", () => {
   const points = [point(0, 5), point(10, 4), point(20, 9), point(30, 8.5), point(300, 1)];
-  assert.deepEqual(uses(points, [{ from: 30, to: 300 }], 100), [{ from: 0, to: 100, amount: 1.5 }]);
+  assert.deepEqual(uses(points, [{ from: 30, to: 300 }], [0, 100, 200]), [{ from: 0, to: 100, amount: 1.5 }]);
+});
+
+test("use is counted in the day in which it was, a fall over midnight in both", () => {
+  const points = [point(-50, 8), point(0, 7), point(90, 6), point(130, 4), point(190, 3), point(250, 3)];
+  assert.deepEqual(uses(points, [], [0, 100, 200]), [
+    { from: 0, to: 100, amount: 1.5 },
+    { from: 100, to: 200, amount: 2.5 },
+  ]);
 });
 
 test("a day's last reading stands for the day", () => {

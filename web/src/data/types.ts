@@ -690,6 +690,8 @@ export interface Site {
   needs_user: boolean;
   disk_free_bytes: number;
   disk_total_bytes: number;
+  /** Whether no frames are taken for want of room. */
+  disk_short: boolean;
   frames_queued: number;
   frames_failed: number;
   /** Number of the last change; where the stream of events begins. */

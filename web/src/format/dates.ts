@@ -35,6 +35,32 @@ export function day(language: string, milliseconds: number, zone: string): strin
   );
 }
 
+/** How far a zone's clocks are ahead of UTC at a moment, seconds. */
+function ahead(words: Intl.DateTimeFormat, seconds: number): number {
+  const part = Object.fromEntries(words.formatToParts(seconds * 1000).map(({ type, value }) => [type, Number(value)]));
+  const { year = 0, month = 1, day: of = 1, hour = 0, minute = 0, second = 0 } = part;
+  return Date.UTC(year, month - 1, of, hour, minute, second) / 1000 - Math.floor(seconds);
+}
+
+const NUMBERS = { year: "numeric", month: "numeric", day: "numeric", hour: "numeric", minute: "numeric" } as const;
+
+/** Midnights of a zone, `days` days apart, from the one before `from` to the first one behind `to`, seconds. A day at
+ * whose border clocks change has 23 or 25 hours, or what its zone makes of it; one without a midnight begins with its
+ * first moment. */
+export function midnights(from: number, to: number, zone: string, days = 1): number[] {
+  const words = new Intl.DateTimeFormat("en-GB", { ...NUMBERS, second: "numeric", hourCycle: "h23", timeZone: zone });
+  const number = Math.floor((from + ahead(words, from)) / 86_400);
+  const found: number[] = [];
+  for (let local = number * 86_400; ; local += days * 86_400) {
+    const before = local - ahead(words, local - 86_400);
+    const after = local - ahead(words, local + 86_400);
+    const ours = [before, after].filter((at) => at + ahead(words, at) === local);
+    const at = ours.length > 0 ? Math.min(...ours) : before;
+    found.push(at);
+    if (at >= to) return found;
+  }
+}
+
 /** A span of days, shortened where both lie in one month: "2 – 6 Dec". */
 export function days(language: string, from: number, to: number, zone: string): string {
   return new Intl.DateTimeFormat(language, { day: "numeric", month: "short", timeZone: zone }).formatRange(from, to);

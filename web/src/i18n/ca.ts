@@ -200,6 +200,7 @@ export const ca: Texts = {
   "machine.title": "Aquesta màquina",
   "machine.version": "Versió",
   "machine.disk": "Lliure al disc",
+  "machine.short": "El disc és ple ({free} lliures): no s'accepten imatges. Allibereu espai o afegiu un disc.",
   "machine.queue": "Imatges en espera",
   "machine.failed": "Imatges fallides",
   "reason.refused": "Sense resultat",

@@ -200,6 +200,8 @@ export const de: Texts = {
   "machine.title": "Diese Maschine",
   "machine.version": "Version",
   "machine.disk": "Frei auf der Platte",
+  "machine.short":
+    "Der Datenträger ist voll ({free} frei): Es werden keine Bilder angenommen. Platz schaffen oder einen Datenträger ergänzen.",
   "machine.queue": "Wartende Bilder",
   "machine.failed": "Gescheiterte Bilder",
   "reason.refused": "Kein Ergebnis",

@@ -197,6 +197,7 @@ export const en = {
   "machine.title": "This machine",
   "machine.version": "Version",
   "machine.disk": "Free on disk",
+  "machine.short": "The disk is full ({free} free): no frames are taken. Free some space or add a disk.",
   "machine.queue": "Frames that wait",
   "machine.failed": "Frames that failed",
   "reason.refused": "No answer",

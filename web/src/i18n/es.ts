@@ -200,6 +200,7 @@ export const es: Texts = {
   "machine.title": "Esta máquina",
   "machine.version": "Versión",
   "machine.disk": "Libre en disco",
+  "machine.short": "El disco está lleno ({free} libres): no se aceptan imágenes. Libere espacio o añada un disco.",
   "machine.queue": "Imágenes en espera",
   "machine.failed": "Imágenes fallidas",
   "reason.refused": "Sin resultado",

@@ -73,15 +73,22 @@ export interface Use extends Span {
   amount: number;
 }
 
-/** What was used in stretches of `length` seconds: the sum of falls between readings; rises and gaps count as none. */
-export function uses(points: Point[], holes: Span[], length: number): Use[] {
+/** What was used between each two of some rising times: the sum of falls between readings, a fall across a border shared
+ * out by time; rises and gaps count as none. Stretches without two readings are left out. */
+export function uses(points: Point[], holes: Span[], borders: number[]): Use[] {
   const found = new Map<number, number>();
   const open = new Set(holes.map((hole) => hole.from));
+  let slot = 0;
   points.slice(1).forEach((point, i) => {
     const before = points[i];
     if (!before || open.has(before.time)) return;
-    const slot = Math.floor(point.time / length);
-    found.set(slot, (found.get(slot) ?? 0) + Math.max(0, before.value - point.value));
+    const fall = Math.max(0, before.value - point.value);
+    while (slot < borders.length - 1 && (borders[slot + 1] ?? 0) <= before.time) slot += 1;
+    for (let at = slot; at < borders.length - 1; at += 1) {
+      const inside = Math.min(point.time, borders[at + 1] ?? 0) - Math.max(before.time, borders[at] ?? 0);
+      if (inside > 0) found.set(at, (found.get(at) ?? 0) + (fall * inside) / (point.time - before.time));
+      if ((borders[at + 1] ?? 0) >= point.time) break;
+    }
   });
-  return [...found].map(([slot, amount]) => ({ from: slot * length, to: (slot + 1) * length, amount }));
+  return [...found].map(([at, amount]) => ({ from: borders[at] ?? 0, to: borders[at + 1] ?? 0, amount }));
 }

@@ -4,7 +4,7 @@ import { atLeast, useNow } from "../context.ts";
 import type { Trend as Answer, Bucket, Event, PageOf, Place, Rule, Silo } from "../data/answers.ts";
 import { api } from "../data/client.ts";
 import { useResource } from "../data/resources.ts";
-import { day } from "../format/dates.ts";
+import { day, midnights } from "../format/dates.ts";
 import { massUnit, number, percent } from "../format/numbers.ts";
 import { useWords } from "../i18n/index.ts";
 import { type Threshold, Trend } from "../parts/trend.tsx";
@@ -138,7 +138,7 @@ interface PlotsProps {
 function Plots({ silo, measure, points, most, span, now, events, rules, outlook }: PlotsProps) {
   const { t, named, locale } = useWords();
   const holes = useMemo(() => gaps(points, most, Math.min(now, span.to)), [points, most, now, span.to]);
-  const length = Math.max(DAY, Math.ceil((span.to - span.from) / 90 / DAY) * DAY);
+  const days = Math.max(1, Math.ceil((span.to - span.from) / 90 / DAY));
   const full =
     silo.now.capacity_m3 === null || measure.perCubicMetre === null
       ? null
@@ -156,7 +156,8 @@ function Plots({ silo, measure, points, most, span, now, events, rules, outlook 
         gaps: holes.length,
       })
     : t("trend.empty");
-  const used = uses(points, holes, length);
+  const borders = useMemo(() => midnights(span.from, span.to, silo.zone, days), [span.from, span.to, silo.zone, days]);
+  const used = uses(points, holes, borders);
   return (
     <div>
       <p class="readout">{"\u00a0"}</p>
@@ -177,7 +178,7 @@ function Plots({ silo, measure, points, most, span, now, events, rules, outlook 
       <UseBars
         uses={used}
         span={span}
-        label={t(length > DAY ? "trend.useIn" : "trend.usePerDay", { days: length / DAY })}
+        label={t(days > 1 ? "trend.useIn" : "trend.usePerDay", { days })}
         text={(amount) => `${number(locale, amount, measure.decimals)} ${measure.unit}`}
       />
       <p class="legend keys">
