@@ -97,6 +97,7 @@ def applied(folder: Path, text: str) -> list[str]:
         ('[[camera]]\nid = "c"\nsilo = "a"', "names the silo 'a', which is not there"),
         ('[[silo]]\nid = "a"\ncalibration = "none.json"', "none.json"),
         ('[[rule]]\nid = "r"\nkind = "loud"', "kind"),
+        ('[site]\nzone = "Europe/Madird"', "site.zone.*must be a time zone"),
         ("[[silo", "no TOML site"),
     ],
 )

@@ -6,6 +6,7 @@ import time
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Protocol
+from zoneinfo import ZoneInfo
 
 SECOND = 1_000_000
 """Microseconds."""
@@ -93,3 +94,12 @@ def micros(text: str) -> int:
     if found.tzinfo is None:
         raise ValueError("the time names no zone")
     return int(found.timestamp()) * SECOND + found.microsecond
+
+
+def zone(name: str) -> str:
+    """Checks the name of a time zone; raises `ValueError` where the machine knows none of this name."""
+    try:
+        ZoneInfo(name)
+    except (ValueError, OSError, KeyError):
+        raise ValueError(f"must be a time zone such as Europe/Madrid, not {name[:40]!r}") from None
+    return name

@@ -75,6 +75,7 @@ class Service:
         self._stories, self._alerting = Storyteller(self.store), Alerting(self.store, self.outbox)
         self._keeper = Keeper(self.store, self.blobs, settings.limits, settings.retention, self.clock)
         self._dirty: dict[str, int] = {}
+        self._was_short = False
         self._lock, self._stopping = threading.Lock(), threading.Event()
         self._threads: list[threading.Thread] = []
         self.parts: list[Part] = []
@@ -160,6 +161,16 @@ class Service:
         limits = self.settings.limits
         return free >= min(limits.reserve, int(limits.reserve_fraction * total))
 
+    def _tell_of_room(self, now: int) -> None:
+        """Notes that the disk has become short of room, or has room again, so that the page says so."""
+        short = not self.has_room()
+        if short == self._was_short:
+            return
+        with self.store.write() as connection:
+            changes.note(connection, "site", "disk", None, now)
+        self._was_short = short
+        self.announce()
+
     def announce(self) -> None:
         """Says that the log of changes has grown."""
         for listener in list(self.listeners):
@@ -174,6 +185,7 @@ class Service:
                 if now - kept >= self.settings.retention.every or not self.has_room():
                     kept = now
                     self._keeper.keep()
+                self._tell_of_room(now)
             except OperationalError:
                 continue  # a full disk or a busy database: the next beat tries again
             if now - ticked >= self.settings.tick:

@@ -13,6 +13,7 @@ from sqlalchemy import Connection
 
 from siloscope.errors import InputError
 from siloscope.monitor import rules
+from siloscope.monitor.clock import zone
 from siloscope.monitor.outlets import Outlets
 from siloscope.monitor.store import alerts, places
 from siloscope.schema import files
@@ -45,6 +46,16 @@ def slug(value: str) -> str:
 Slug = Annotated[str, AfterValidator(slug)]
 
 
+def _zone(value: str) -> str:
+    try:
+        return zone(value)
+    except ValueError as error:
+        raise wrong(str(error)) from None
+
+
+Zone = Annotated[str, AfterValidator(_zone)]
+
+
 class PlaceEntry(StrictDocument):
     """``[[place]]``."""
 
@@ -52,7 +63,7 @@ class PlaceEntry(StrictDocument):
     parent: Slug | None = None
     kind: Literal["mill", "customer", "farm", "barn", "site"] = "site"
     name: str | None = None
-    zone: str | None = None
+    zone: Zone | None = None
 
 
 class SiloEntry(StrictDocument):
@@ -120,7 +131,7 @@ class SiteEntry(StrictDocument):
     """``[site]``."""
 
     name: str | None = None
-    zone: str | None = None
+    zone: Zone | None = None
 
 
 class SiteFile(Outlets):

@@ -74,11 +74,16 @@ class Process:
 
 
 class CalibrationFiles:
-    """Calibrations as files, as the workers read them; made from the store whenever one is missing."""
+    """Calibrations as files, as the workers read them; made from the store whenever one is missing.
+
+    They are made anew after every start: a power cut may have left an empty one under a whole name.
+    """
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
+        for left in folder.glob("*.json"):
+            left.unlink()
 
     def of(self, row: Any) -> Path:
         """The file of a calibration's row."""

@@ -26,14 +26,12 @@ def healthz() -> models.Health:
 @outside.get("/readyz", response_model=models.Health, responses={503: {"model": models.Health}})
 def readyz(service: ServiceOf) -> JSONResponse:
     """Whether frames can be taken: database, disk, queue."""
-    free, total = service.blobs.free()
-    limits = service.settings.limits
-    reserve = min(limits.reserve, int(limits.reserve_fraction * total))
+    free, _ = service.blobs.free()
     try:
         with service.store.read() as connection:
             waiting = frames.waiting(connection)
         detail: dict[str, str | int | float | bool | None] = {"frames_waiting": waiting, "disk_free_bytes": free}
-        ready = free >= reserve and waiting < limits.queue
+        ready = service.has_room() and waiting < service.settings.limits.queue
     except SQLAlchemyError as error:
         detail, ready = {"database": type(error).__name__}, False
     health = models.Health(status="ok" if ready else "not-ready", version=_core.__version__, detail=detail)
@@ -68,6 +66,7 @@ def get_site(connection: Reading, person: PersonOf, service: ServiceOf) -> model
         needs_user=people.count_users(connection) == 0,
         disk_free_bytes=free,
         disk_total_bytes=total,
+        disk_short=not service.has_room(),
         frames_queued=counts["queued"] + counts["measuring"],
         frames_failed=counts["failed"],
         last_change=changes.newest(connection),

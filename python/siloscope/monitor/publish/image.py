@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 from sqlalchemy import Connection
 
-from siloscope.monitor.clock import DAY, SECOND
+from siloscope.monitor.clock import DAY, SECOND, SUSPECT
 from siloscope.monitor.store import alerts, frames, places, readings
 
 Status = Literal["ok", "refused", "stale", "silent", "no-calibration"]
@@ -81,7 +81,7 @@ def _status(connection: Connection, silo: Any, cameras: Sequence[Any], last: Any
     if last is not None and last.time >= limit:
         return "ok" if newest[0].status == "ok" else "refused"
     came = [row for camera in cameras if (row := frames.newest(connection, camera.id)) is not None]
-    recent = [row for row in came if row.captured >= limit]
+    recent = [row for row in came if row.captured >= limit and row.clock != SUSPECT]
     if not recent and not (newest and newest[0].time >= limit):
         return "silent"
     return "no-calibration" if any(row.state == frames.GATHERING for row in recent) else "stale"

@@ -9,7 +9,10 @@ from sqlalchemy import Connection, delete, func, insert, select
 from siloscope.monitor.store.rows import Record
 from siloscope.monitor.store.schema import change
 
-KINDS = ("frame", "reading", "event", "forecast", "alert", "silo", "camera", "calibration", "ticket", "rule", "place")
+KINDS = (
+    *("frame", "reading", "event", "forecast", "alert", "silo", "camera", "calibration", "ticket", "rule", "place"),
+    "site",
+)
 """What a change can be of."""
 
 

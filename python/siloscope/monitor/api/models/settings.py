@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from datetime import datetime
-from typing import Literal
+from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from siloscope.monitor.api.models.base import Model, Time
 from siloscope.monitor.api.models.people import Given
+from siloscope.monitor.clock import zone
 from siloscope.monitor.rules import KINDS
 
 Length = Field(default=None, ge=-200.0, le=200.0)
 Id = Field(default=None, min_length=1, max_length=80)
 Name = Field(default=None, min_length=1, max_length=200)
+Zone = Annotated[str, AfterValidator(zone)]
 
 
 class PlaceChange(Given):
@@ -22,7 +24,7 @@ class PlaceChange(Given):
     parent: str | None = Id
     kind: Literal["mill", "customer", "farm", "barn", "site"] | None = None
     name: str | None = Name
-    zone: str | None = Field(default=None, max_length=64)
+    zone: Zone | None = Field(default=None, max_length=64)
 
 
 class VesselChange(Given):

@@ -98,6 +98,7 @@ class Site(Model):
     needs_user: bool = Field(description="Whether no user exists yet.")
     disk_free_bytes: int
     disk_total_bytes: int
+    disk_short: bool = Field(description="Whether no frames are taken for want of room.")
     frames_queued: int
     frames_failed: int
     last_change: int = Field(description="Number of the last change; where the stream of events begins.")
