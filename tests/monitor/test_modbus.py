@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import random
+import re
 import shutil
 import socket
 import struct
@@ -130,6 +131,23 @@ def test_a_foreign_client_reads_the_same(service: Farm) -> None:
     done = subprocess.run([*command, "-r", "101", "-c", "4", "127.0.0.1"], capture_output=True, text=True, check=True)
     values = [line.split("\t")[-1].strip() for line in done.stdout.splitlines() if line.startswith("[")]
     assert [float(value) for value in values] == pytest.approx([10.0, 0.1, 10.0, 50.0])
+
+
+def test_the_documented_addresses_are_those_that_answer(client: ModbusTcpClient) -> None:
+    """The table in `integrator.md` has both ways of counting, one apart, and both orders hold its numbers."""
+    text = (Path(__file__).parents[2] / "docs" / "monitor" / "integrator.md").read_text("utf-8")
+    rows = re.findall(r"^\| ([\d, ]+) \| (4[\d, ]+) \| (float32|uint32|uint16|4 characters) \|", text, re.MULTILINE)
+    kinds = {"float32": "FLOAT32", "uint32": "UINT32", "uint16": "UINT16", "4 characters": "STRING"}
+    known = 0
+    for addresses, counted, kind in rows:
+        for address, other in zip(addresses.split(","), counted.split(","), strict=True):
+            assert int(other) == 40_001 + int(address)
+            length = 1 if kind == "uint16" else 2
+            high = read(client, kinds[kind], int(address), length)
+            low = read(client, kinds[kind], 1000 + int(address), length, swapped=kind.endswith("32"))
+            assert high == low or (math.isnan(high) and math.isnan(low))
+            known += 1
+    assert known == 29
 
 
 def test_a_taken_port_is_told_at_the_start(service: Farm, tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import http.cookies
+import os
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -130,6 +131,27 @@ def test_only_this_machine_reaches_a_service_without_users(tmp_path: Path) -> No
     from siloscope.cli import main
 
     assert main(["serve", "--data", str(tmp_path / "data"), "--bind", "0.0.0.0:0"]) == 2
+
+
+def listened_on(process: int) -> set[tuple[str, int]]:
+    """Addresses on which a process listens, by the kernel."""
+    links = [os.readlink(path) for path in Path(f"/proc/{process}/fd").iterdir() if path.is_symlink()]
+    sockets = {link[8:-1] for link in links if link.startswith("socket:[")}
+    found = set()
+    for table in ("tcp", "tcp6"):
+        for line in Path(f"/proc/{process}/net/{table}").read_text().splitlines()[1:]:
+            words = line.split()
+            if words[3] == "0A" and words[9] in sockets:
+                address, _, port = words[1].rpartition(":")
+                found.add((address, int(port, 16)))
+    return found
+
+
+@pytest.mark.skipif(not Path("/proc/self/net/tcp").exists(), reason="this system does not tell who listens")
+def test_nothing_listens_but_the_one_address_of_this_machine(server: Server) -> None:
+    """No other port, none that others reach; its interface wants a token from who is not at this machine."""
+    (port,) = {int(server.root.rpartition(":")[2])}
+    assert listened_on(server.process.pid) == {("0100007F", port)}
 
 
 def test_a_user_is_made_on_the_command_line(tmp_path: Path) -> None:

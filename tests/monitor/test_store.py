@@ -6,6 +6,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,7 +17,9 @@ from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
 from sqlalchemy import text
 
-from monitor.servers import write_site
+from monitor import farm
+from monitor.servers import eventually, write_site
+from siloscope.client import Client
 from siloscope.errors import InputError, UsageError
 from siloscope.monitor import administration, site
 from siloscope.monitor.blobs import Blobs
@@ -246,10 +249,14 @@ def test_two_services_do_not_share_a_folder(tmp_path: Path) -> None:
 
 
 class SmallDisk(Blobs):
-    """A disk on which every file takes a tenth."""
+    """A disk for so many files."""
+
+    def __init__(self, folder: Path, whole: int = 10) -> None:
+        super().__init__(folder)
+        self.whole = whole
 
     def free(self) -> tuple[int, int]:
-        return 10 - len(list(self.hashes())), 10
+        return self.whole - len(list(self.hashes())), self.whole
 
 
 def kept(store: Store, blobs: Blobs, text_: bytes, captured: int, state: str = frames.MEASURED) -> str:
@@ -294,6 +301,74 @@ def test_a_nearly_full_disk_loses_its_oldest_frames_first(store: Store, tmp_path
     assert gone.for_room == 9
     assert not any(there(store, key) for key in keys)
     assert there(store, waiting)
+
+
+def test_the_newest_evidence_stays_and_the_reserve_is_free_again(store: Store, tmp_path: Path) -> None:
+    """Whatever their age, the oldest go, and no more than the room needs."""
+    filled(store, tmp_path / "site")
+    blobs = SmallDisk(tmp_path / "frames", 200)
+    keys = [kept(store, blobs, f"frame{k}".encode(), NOW - (140 - k) * SECOND) for k in range(140)]
+    gone = keeper(store, blobs, reserve=60).keep()
+    assert (gone.by_age, gone.for_room) == (0, 50)
+    assert [there(store, key) for key in keys] == [False] * 50 + [True] * 90
+    assert blobs.free()[0] >= 60
+    with store.read() as connection:
+        assert len(readings.page(connection, "silo7", readings.Span(), None, 100)) == 48
+
+
+def test_a_disk_without_room_is_told_on_the_page(tmp_path: Path) -> None:
+    """The page asks anew when the log says so."""
+    service = farm.make(tmp_path)
+    with farm.listening(service) as address:
+        client = Client(address)
+        assert client.get("/api/v1/site")["disk_short"] is False
+        service.blobs.free = lambda: (1, 1000)  # type: ignore[method-assign]
+        service.start()
+        changed = eventually(
+            lambda: [one for one in client.pages("/api/v1/changes", {}) if one["kind"] == "site"], seconds=30
+        )
+        assert [one["subject"] for one in changed] == ["disk"]
+        assert client.get("/api/v1/site")["disk_short"] is True
+
+
+def test_two_processes_and_many_readers_never_find_it_locked(tmp_path: Path) -> None:
+    """Each process has its own write lock; the file's own has to do between them."""
+    url = Settings(tmp_path).url
+    stores = [opened(url) for _ in range(2)]
+    filled(stores[0], tmp_path / "site")
+    stop, failed = threading.Event(), []
+
+    def write(store: Store, name: str) -> None:
+        for k in range(40):
+            with store.write() as connection:
+                before = places.fact(connection, "count") or 0
+                places.set_fact(connection, "count", before + 1)
+                places.put(connection, "place", f"{name}{k}", {"kind": "site", "name": name}, NOW)
+
+    def read(store: Store) -> None:
+        while not stop.is_set():
+            with store.read() as connection:
+                readings.page(connection, "silo7", readings.Span(), None, 100)
+
+    def guarded(work: Any, *told: Any) -> None:
+        try:
+            work(*told)
+        except Exception as error:
+            failed.append(error)
+
+    writers = [threading.Thread(target=guarded, args=(write, stores[k % 2], f"w{k}")) for k in range(6)]
+    readers = [threading.Thread(target=guarded, args=(read, store)) for store in stores]
+    for thread in (*writers, *readers):
+        thread.start()
+    for thread in writers:
+        thread.join()
+    stop.set()
+    for thread in readers:
+        thread.join()
+    with stores[0].read() as connection:
+        assert (failed, places.fact(connection, "count")) == ([], 240)
+    for store in stores:
+        store.close()
 
 
 def test_bytes_that_two_cameras_sent_stay_while_one_frame_needs_them(store: Store, tmp_path: Path) -> None:
