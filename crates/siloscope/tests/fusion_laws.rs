@@ -49,7 +49,7 @@ fn sight(predictor: &Predictor, ray: [f64; 2], reading: Option<f64>) -> Option<(
         rate: at.along / predictor.state.bias().slope(depth),
         angle2: 0.0,
         ray,
-        even: true,
+        bend: None,
     };
     (depth.is_finite() && at.along > 0.05).then_some((found, told))
 }

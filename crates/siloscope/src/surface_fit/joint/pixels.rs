@@ -21,7 +21,7 @@ const EVEN: f64 = 1.3;
 pub fn pixel_means(frame: &Frame, predictor: &Predictor, labels: &Labels, tau: [f64; 2], sights: &mut [Option<Sight>]) {
     for (i, sight) in sights.iter_mut().enumerate() {
         let likely = labels.wall.get(i).is_some_and(|p| *p > LIKELY);
-        if let Some(seen) = sight.filter(|s| likely && !(s.even && is_even(frame, i))) {
+        if let Some(seen) = sight.filter(|s| likely && !(s.bend.is_none_or(|bend| bend.even) && is_even(frame, i))) {
             *sight = pixel_mean(frame, predictor, tau, i, seen);
         }
     }

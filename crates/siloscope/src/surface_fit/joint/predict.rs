@@ -34,7 +34,18 @@ pub struct Sight {
     pub angle2: f64,
     /// The tile's ray by the told intrinsics.
     pub ray: [f64; 2],
-    /// Whether the wall is a quadratic over the tile.
+    /// How the wall bends over the tile, where that counts.
+    pub bend: Option<Bend>,
+}
+
+/// How the wall bends over a tile: it hardly changes while a fit settles.
+#[derive(Debug, Clone, Copy)]
+pub struct Bend {
+    /// Part of the wall.
+    pub part: Part,
+    /// Mean of the readings over the tile's pixels minus that at its mean ray, metres.
+    pub mean: f64,
+    /// Whether a quadratic through the nodes is exact enough for that.
     pub even: bool,
 }
 
@@ -138,9 +149,10 @@ impl<'a> Predictor<'a> {
 
     /// Tile `i` against the wall; `None` where its ray misses or grazes it, or where it straddles the joint.
     ///
-    /// With `curved` the mean over the tile's pixels takes the place of the wall at its centre.
+    /// With `curved` the mean over the tile's pixels takes the place of the wall at its centre; `before` is how the same
+    /// wall bent there.
     #[inline]
-    pub fn sight(&self, readings: &Readings, i: usize, curved: bool) -> Option<Sight> {
+    pub fn sight(&self, readings: &Readings, i: usize, curved: bool, before: Option<Bend>) -> Option<Sight> {
         let patch = readings.patches.list.get(i)?;
         let ray = [patch.q.x, patch.q.y];
         let turned = self.caster.turn(self.state.corrected(ray));
@@ -155,10 +167,13 @@ impl<'a> Predictor<'a> {
         }
         let rough = patch.measured - self.bias.measured(depth);
         let near = curved && (rough * cosine).abs() < NEAR;
-        let ([mean, centre], even) = if near { self.mean(readings, i, (at.part, bulge))? } else { ([0.0; 2], true) };
-        let side = readings.patches.side as f64;
-        // a tile that lacks pixels has its mean ray elsewhere
-        let residual = if near && patch.count >= side * side { patch.measured - mean } else { rough - mean + centre };
+        let bend = if near {
+            let same = before.filter(|bend| bend.part == at.part);
+            Some(same.map_or_else(|| self.bend(readings, i, (at.part, bulge), patch.measured - rough), Some)?)
+        } else {
+            None
+        };
+        let residual = rough - bend.map_or(0.0, |bend| bend.mean);
         let normal = self.caster.rotate(&patch.normal);
         let facing = -(at.radial[0] * normal.x + at.radial[1] * normal.y + at.rise * normal.z) / norm;
         Some(Sight {
@@ -168,14 +183,14 @@ impl<'a> Predictor<'a> {
             rate: at.along / self.bias.slope(depth),
             angle2: (2.0 - 2.0 * facing).max(0.0),
             ray,
-            even,
+            bend,
         })
     }
 
-    /// Mean of the readings over a tile's pixels, that at its centre node, and whether a quadratic through the nodes is
-    /// exact enough for that.
+    /// How a part of the wall bends over a tile that reads `at_mean_ray` along its mean ray.
     #[inline]
-    fn mean(&self, readings: &Readings, i: usize, (part, bulge): (Part, f64)) -> Option<([f64; 2], bool)> {
+    fn bend(&self, readings: &Readings, i: usize, (part, bulge): (Part, f64), at_mean_ray: f64) -> Option<Bend> {
+        let patch = readings.patches.list.get(i)?;
         let rays = readings.patches.rays.get(i)?;
         let read = |ray: [f64; 2]| self.bias.measured(self.true_depth(ray, part, bulge));
         let values = rays.nodes().map(read);
@@ -183,7 +198,12 @@ impl<'a> Predictor<'a> {
         let mean = sum(&readings.node_weights);
         let probes = rays.probes(readings.patches.side);
         let off = |k: usize| (sum(&PROBES[k]) - read(probes[k].1)).abs();
-        mean.is_finite().then(|| ([mean, values[4]], off(0) < QUADRATIC_REST && off(1) < QUADRATIC_REST))
+        let side = readings.patches.side as f64;
+        let full = patch.count >= side * side;
+        // a tile that lacks pixels has its mean ray elsewhere
+        let mean = mean - if full { at_mean_ray } else { values[4] };
+        let even = off(0) < QUADRATIC_REST && off(1) < QUADRATIC_REST;
+        mean.is_finite().then_some(Bend { part, mean, even })
     }
 
     /// True depth of a part of the wall on a told ray, with a bulge held; not finite where it is not met.
@@ -280,7 +300,7 @@ mod tests {
         let (depth, at, _) = predictor.meet(&predictor.caster.turn(state.corrected(ray)))?;
         let bias = state.bias();
         let rate = at.along / bias.slope(depth);
-        let sight = Sight { residual: 0.0, depth, at, rate, angle2: 0.0, ray, even: true };
+        let sight = Sight { residual: 0.0, depth, at, rate, angle2: 0.0, ray, bend: None };
         ((at.z - predictor.joint).abs() > 0.1).then(|| (bias.measured(depth), sight))
     }
 

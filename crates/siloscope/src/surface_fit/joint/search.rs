@@ -90,6 +90,8 @@ pub fn search(
         if fits.first().is_some_and(|fit| is_certain(frame, fit, &weighed)) {
             return Search { fits, weighed };
         }
+        // beside others it is weighed with its own widths, not with those on the way to them
+        fits = fits.into_iter().map(|fit| fit.clone().run(frame, &AGAIN).unwrap_or(fit)).collect();
     }
     fits.extend(near.and_then(|fit| beside(frame, fit, &other_part)));
     let starts = distinct(near, proposals);
@@ -125,7 +127,7 @@ pub fn search(
     let mut weighed = weigh(frame, &fits);
     // a model's own widths are learned under its own prior
     let again = weighed.first().filter(|best| fits[best.fit].model != best.model).and_then(|best| {
-        let mut again = JointFit { model: best.model, ..fits[best.fit].clone() };
+        let mut again = JointFit { model: best.model, moved: f64::INFINITY, ..fits[best.fit].clone() };
         again.state.x = best.mean;
         again.run(frame, &AGAIN)
     });

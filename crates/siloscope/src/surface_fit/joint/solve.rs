@@ -9,7 +9,7 @@ use crate::surface_fit::joint::parameters::{COMMON, CYLINDER_END, INTERCEPT, Joi
 use crate::surface_fit::joint::pixels::pixel_means;
 use crate::surface_fit::joint::predict::{Predictor, Sight, own_columns};
 use crate::surface_fit::joint::readings::Readings;
-use crate::surface_fit::joint::system::{Accumulator, Posterior, Quadratic};
+use crate::surface_fit::joint::system::{Accumulator, Posterior, Quadratic, dot};
 
 /// Smallest model error, metres: what the tiles' own means resolve.
 pub const TAU_FLOOR: f64 = 1e-5;
@@ -21,6 +21,8 @@ const TAU_GROWTH: f64 = 1.3;
 const SMALL_STEP: f64 = 3e-4;
 /// Below this model error a tile's curvature matters, metres.
 const CURVED_BELOW: f64 = 3e-3;
+/// After a step of the pose this small the wall bends over a tile as before, rad and radii.
+const SAME_BEND: f64 = 3e-3;
 
 /// A model's fit.
 #[derive(Debug, Clone)]
@@ -42,6 +44,8 @@ pub struct JointFit {
     /// The frame's sum of squares about the state, without priors.
     pub quadratic: Quadratic,
     pub(super) fractions: [f64; 3],
+    /// By how much the pose moved since the tiles were last held against the wall, rad and radii.
+    pub(super) moved: f64,
 }
 
 /// How a fit runs.
@@ -75,6 +79,7 @@ impl JointFit {
             sights: Vec::new(),
             quadratic: Accumulator::default().quadratic(),
             fractions: [0.5, 0.45, 0.05],
+            moved: f64::INFINITY,
             state,
         }
     }
@@ -134,8 +139,9 @@ impl JointFit {
             patches.list[i].tile.0.is_multiple_of(pass.every) && patches.list[i].tile.1.is_multiple_of(pass.every)
         };
         let n = frame.readings.patches.list.len();
-        self.sights =
-            (0..n).map(|i| if asked(i) { predictor.sight(frame.readings, i, curved) } else { None }).collect();
+        let before = std::mem::take(&mut self.sights);
+        let bend = |i: usize| before.get(i)?.filter(|_| self.moved < SAME_BEND)?.bend;
+        self.sights = (0..n).map(|i| asked(i).then(|| predictor.sight(frame.readings, i, curved, bend(i)))?).collect();
         if pass.every == 1 {
             self.relabel(frame, pass);
             pixel_means(frame, &predictor, &self.labels, self.tau, &mut self.sights);
@@ -165,6 +171,7 @@ impl JointFit {
             }
             self.settle_tau(frame.readings, pass);
         }
+        self.moved = moved;
         Some(moved)
     }
 
@@ -230,9 +237,8 @@ impl JointFit {
             start += width;
             if let Some(sight) = &mut self.sights[i] {
                 let own = own_columns(sight.at.part);
-                let common: f64 = values[..COMMON].iter().zip(&step[..COMMON]).map(|(j, s)| j * s).sum();
-                let rest: f64 = values[COMMON..].iter().zip(&step[own..]).map(|(j, s)| j * s).sum();
-                sight.residual += factor * (common + rest);
+                let common = dot(&values[..COMMON], &step[..COMMON]);
+                sight.residual += factor * (common + dot(&values[COMMON..], &step[own..own + width - COMMON]));
             }
         }
     }

@@ -53,16 +53,25 @@ impl PartSum {
     }
 }
 
+/// Rows that are added to the sums together.
+const BATCH: usize = 4;
+
 /// Rows added up by part.
 #[derive(Debug, Clone)]
 pub struct Accumulator {
     sums: [Vec<f64>; 2],
     gradients: [Vec<f64>; 2],
+    waiting: [Vec<[f64; CYLINDER_END]>; 2],
 }
 
 impl Default for Accumulator {
     fn default() -> Self {
-        Self { sums: WIDTHS.map(|n| vec![0.0; n * n]), gradients: WIDTHS.map(|n| vec![0.0; n]) }
+        let waiting = || Vec::with_capacity(BATCH);
+        Self {
+            sums: WIDTHS.map(|n| vec![0.0; n * n]),
+            gradients: WIDTHS.map(|n| vec![0.0; n]),
+            waiting: [waiting(), waiting()],
+        }
     }
 }
 
@@ -71,18 +80,38 @@ impl Accumulator {
     #[inline]
     pub fn add(&mut self, part: Part, row: &[f64], residual: f64, weight: f64) {
         let p = usize::from(part == Part::Cone);
-        let width = WIDTHS[p];
-        for (k, (&j, sums)) in row.iter().zip(self.sums[p].chunks_exact_mut(width)).enumerate() {
-            let factor = weight * j;
-            for (sum, &other) in sums[k..].iter_mut().zip(&row[k..]) {
-                *sum += factor * other;
-            }
-            self.gradients[p][k] += factor * residual;
+        let (root, mut scaled) = (weight.sqrt(), [0.0; CYLINDER_END]);
+        scaled.iter_mut().zip(row).for_each(|(scaled, value)| *scaled = root * value);
+        let residual = root * residual;
+        self.gradients[p].iter_mut().zip(&scaled).for_each(|(sum, value)| *sum += value * residual);
+        self.waiting[p].push(scaled);
+        if self.waiting[p].len() == BATCH {
+            self.add_waiting(p);
         }
     }
 
+    /// Adds the products of the rows that wait: all at once, so that each sum is read and written once for them.
+    fn add_waiting(&mut self, p: usize) {
+        let width = WIDTHS[p];
+        self.waiting[p].resize(BATCH, [0.0; CYLINDER_END]);
+        if let [a, b, c, d] = self.waiting[p].as_slice() {
+            for (k, sums) in self.sums[p].chunks_exact_mut(width).enumerate() {
+                let factors = [a[k], b[k], c[k], d[k]];
+                if factors == [0.0; BATCH] {
+                    continue;
+                }
+                let others = a[k..].iter().zip(&b[k..]).zip(&c[k..]).zip(&d[k..]);
+                for (sum, (((a, b), c), d)) in sums[k..].iter_mut().zip(others) {
+                    *sum += (factors[0] * a + factors[1] * b) + (factors[2] * c + factors[3] * d);
+                }
+            }
+        }
+        self.waiting[p].clear();
+    }
+
     /// The sums over all parameters.
-    pub fn quadratic(&self) -> Quadratic {
+    pub fn quadratic(mut self) -> Quadratic {
+        (0..2).for_each(|p| self.add_waiting(p));
         let mut information = DMatrix::zeros(SIZE, SIZE);
         let mut gradient = DVector::zeros(SIZE);
         for (p, part) in [Part::Cylinder, Part::Cone].into_iter().enumerate() {
@@ -269,9 +298,9 @@ impl Triangle {
     }
 }
 
-/// Four sums side by side: the order is fixed, so that the result is.
+/// Inner product of equal lengths, four sums side by side: the order is fixed, so that the result is.
 #[inline]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a4, a), (b4, b)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut sums = [0.0; 4];
     for (a, b) in a4.iter().zip(b4) {
