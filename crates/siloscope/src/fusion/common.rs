@@ -18,6 +18,8 @@ const ROUNDS: usize = 12;
 const BENT_ROUNDS: usize = 40;
 /// A step of the pose this small is the last there, in standard deviations.
 const SMALL_STEP: f64 = 1e-7;
+/// So near to where the frames were placed no valley is bent, in standard deviations.
+const STRAIGHT: f64 = 0.01;
 /// Weights that change by less than this have settled.
 const SETTLED: f64 = 1e-6;
 /// Deviation at which a frame's cost is cut off.
@@ -159,16 +161,18 @@ impl Rounds<'_> {
         let mut agreeing: Vec<[f64; 2]> = cones.iter().map(|cone| [0.0, *cone]).collect();
         agreeing[base][0] = 1.0;
         let mut cost = f64::INFINITY;
-        for _ in 0..CONCENTRATIONS {
-            let placed = self.placed(&state, &heights);
+        let mut placed = self.placed(&state, &heights);
+        for round in 0..CONCENTRATIONS {
+            if round > 0 && self.is_bent() {
+                placed = self.placed(&state, &heights);
+            }
             let quadratic = self.sum(&placed, &agreeing, (&state, &heights), 1.0).quadratic();
             let system = System { quadratic: &quadratic, state: &state, inputs: self.inputs, form: self.form };
             let found = system.solved(system.widest())?;
             let step: [f64; SIZE] = std::array::from_fn(|k| found.state.x[k] - state.x[k]);
+            placed.iter_mut().for_each(|frame| frame.shift(&step));
             let off = |(frame, cone): (&Placed, &f64)| {
-                let mut moved = frame.clone();
-                moved.shift(&step);
-                distance(&moved, &by_kind(1.0, *cone), &PLACE, (&found.covariance, 1.0))
+                distance(frame, &by_kind(1.0, *cone), &PLACE, (&found.covariance, 1.0))
             };
             let distances: Vec<Distance> = placed.iter().zip(&cones).map(off).collect();
             let told = |d: &Distance| if d.dof < 4 { f64::INFINITY } else { d.squared / d.dof as f64 };
@@ -184,10 +188,10 @@ impl Rounds<'_> {
 
     fn run(&self, start: Start) -> Option<Common> {
         let Start { mut state, heights, agreeing: mut weights } = start;
-        let mut placed = self.placed(&state, &heights);
+        let (mut placed, mut at) = (self.placed(&state, &heights), state.x);
         let mut excess = 1.0;
         let mut found: Option<(Solved, Vec<f64>)> = None;
-        let bent = self.inputs.bias_std[2] > BENT;
+        let bent = self.is_bent();
         for round in 0..if bent { BENT_ROUNDS } else { ROUNDS } {
             let sum = self.sum(&placed, &weights, (&state, &heights), excess);
             let quadratic = sum.quadratic();
@@ -197,8 +201,10 @@ impl Rounds<'_> {
             let best = same.or_else(|| system.models().into_iter().next())?;
             let step: [f64; SIZE] = std::array::from_fn(|k| best.state.x[k] - state.x[k]);
             state = best.state.clone();
-            if bent || round == 0 {
-                placed = self.placed(&state, &heights);
+            let std = |k: usize| best.covariance[(k, k)].sqrt();
+            let away = || (0..SIZE).any(|k| (state.x[k] - at[k]).abs() > STRAIGHT * std(k));
+            if round == 0 || bent && away() {
+                (placed, at) = (self.placed(&state, &heights), state.x);
             } else {
                 placed.iter_mut().for_each(|frame| frame.shift(&step));
             }
@@ -209,7 +215,7 @@ impl Rounds<'_> {
             let settled = change.fold(0.0, f64::max) < SETTLED;
             let next = excess * more;
             let calm = (next / excess - 1.0).abs() < 0.01;
-            let small = |k: usize| step[k].abs() < SMALL_STEP * best.covariance[(k, k)].sqrt();
+            let small = |k: usize| step[k].abs() < SMALL_STEP * std(k);
             let still = !bent || (0..4).all(small);
             found = Some((best, distances.iter().map(|[place, _]| place.over(more).deviation()).collect()));
             if settled && calm && still && round > 0 {
@@ -221,6 +227,11 @@ impl Rounds<'_> {
         let sum = self.sum(&placed, &weights, (&state, &heights), excess);
         let inputs = self.inputs.clone();
         Some(Common { state, heights, inputs, placed, sum, weights, deviations, excess, best })
+    }
+
+    /// Whether the frames' valleys are bent, so that their equations are made anew where the answer moves.
+    fn is_bent(&self) -> bool {
+        self.inputs.bias_std[2] > BENT
     }
 
     fn placed(&self, state: &JointState, heights: &Heights) -> Vec<Placed> {

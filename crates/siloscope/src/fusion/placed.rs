@@ -32,13 +32,11 @@ impl Placed {
             let turn = if far { Turn::new(frame, share.kind, &there, &step) } else { None };
             let step = turn.as_ref().map_or(&step, |turn| &turn.step);
             let own: Vec<f64> = share.kind.columns().iter().map(|&k| step[k]).collect();
-            let gradient = share.gradient_after(&own);
-            match (&by_common, &turn) {
-                (None, None) => Share { gradient, ..share.clone() },
-                (Some(map), None) => mapped(share, &gradient, map),
-                (None, Some(turn)) => mapped(share, &gradient, &turn.matrix),
-                (Some(map), Some(turn)) => mapped(share, &gradient, &(&turn.matrix * map)),
+            let mut placed = Share { gradient: share.gradient_after(&own), ..share.clone() };
+            for map in [turn.as_ref().map(|turn| &turn.matrix), by_common.as_ref()].into_iter().flatten() {
+                placed = mapped(placed, map);
             }
+            placed
         };
         Self { shares: frame.shares.iter().map(placed).collect() }
     }
@@ -58,14 +56,25 @@ impl Placed {
 }
 
 /// Mᵀ H M and Mᵀ g, within the share's own columns: the map leaves them among themselves.
-fn mapped(share: &Share, gradient: &[f64], map: &DMatrix<f64>) -> Share {
+fn mapped(share: Share, map: &DMatrix<f64>) -> Share {
     let columns = share.kind.columns();
     let n = columns.len();
-    let map = DMatrix::from_fn(n, n, |r, c| map[(columns[r], columns[c])]);
+    // most of a map is the identity
+    let mut entries = Vec::new();
+    for c in 0..n {
+        entries.extend((0..n).map(|r| (r, c, map[(columns[r], columns[c])])).filter(|entry| entry.2 != 0.0));
+    }
     let information = DMatrix::from_row_slice(n, n, &share.information);
-    let turned = map.transpose() * information * &map;
-    let gradient = map.transpose() * DVector::from_row_slice(gradient);
-    Share { information: turned.as_slice().to_vec(), gradient: gradient.as_slice().to_vec(), ..share.clone() }
+    let (mut right, mut turned, mut moved) = (DMatrix::zeros(n, n), DMatrix::zeros(n, n), vec![0.0; n]);
+    for &(r, c, value) in &entries {
+        right.column_mut(c).axpy(value, &information.column(r), 1.0);
+        moved[c] += value * share.gradient[r];
+    }
+    let right: DMatrix<f64> = right.transpose();
+    for &(r, c, value) in &entries {
+        turned.column_mut(c).axpy(value, &right.column(r), 1.0);
+    }
+    Share { information: turned.as_slice().to_vec(), gradient: moved, ..share }
 }
 
 /// Whether a step leads beyond where a frame's equations hold.
