@@ -45,6 +45,8 @@ Kinect's narrow mode, cut out of a larger image, reaches 0.106, others 0.05."""
 UNEQUAL = CONTRADICTION * math.sqrt(2.0) * CALIBRATED.f
 """Fraction by which fx and fy of square pixels can't differ: 5 deviations of two calibrated focal lengths."""
 
+LINES = 48
+"""Of about so many rows, and columns, as evenly spread, runs are counted: they tell the fraction of all."""
 RUN = 16
 """Equal pixels in a row that are no chance where values have noise."""
 
@@ -133,7 +135,8 @@ def hole_remarks(depth: NDArray[np.float32]) -> Iterator[Remark]:
 
     Coarse sensors repeat values too, both ways and in runs of every length; filled holes are long runs among noise.
     """
-    (filled, shorter, equal), (other, *_) = sorted((_repeated(depth), _repeated(depth.T)), reverse=True)
+    some = [np.ascontiguousarray(image[:: max(1, len(image) // LINES)]) for image in (depth, depth.T)]
+    (filled, shorter, equal), (other, *_) = sorted(map(_repeated, some), reverse=True)
     one_way = filled > FILLED and filled > ONE_WAY * max(other, shorter)
     if one_way and equal - filled < COARSE * (1.0 - filled):
         yield Remark("hole-filled", f"{100 * filled:.0f} % of the pixels repeat the value beside them in long rows")
