@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from siloscope.types.surface_map import SurfaceMap
     from siloscope.types.track import Track
     from siloscope.types.vessel import SiloGeometry
+    from siloscope.validation.validate import Validation, validate
 
 __all__ = [
     "Calibration",
@@ -45,6 +46,7 @@ __all__ = [
     "SurfaceMap",
     "Track",
     "UsageError",
+    "Validation",
     "__version__",
     "calibrate",
     "learn_floor",
@@ -54,6 +56,7 @@ __all__ = [
     "surface_map",
     "tare",
     "track",
+    "validate",
     "volume_between",
 ]
 
@@ -75,6 +78,7 @@ _HOMES = {
     "types.surface_map": ("SurfaceMap",),
     "types.track": ("Track",),
     "types.vessel": ("SiloGeometry",),
+    "validation.validate": ("Validation", "validate"),
     **{verb: (verb,) for verb in _VERBS},
 }
 """Modules and the names that users have from them here."""

@@ -108,9 +108,12 @@ class Scene:
     def shoot(self) -> Shot:
         """One frame."""
         depth, shown, points = self.exact()
+        return Shot(self, depth, shown, points, self.reading(depth, points))
+
+    def reading(self, depth: Array, points: Array) -> Array:
+        """What the sensor reads of exact depths (H, W) and their points (H, W, 3)."""
         cosine, deep = self._lighting(depth, points)
-        reading = measured(self.sensor, self.faults, depth, cosine, deep, self.seed, self.device)
-        return Shot(self, depth, shown, points, reading)
+        return measured(self.sensor, self.faults, depth, cosine, deep, self.seed, self.device)
 
     def _lighting(self, depth: Array, points: Array) -> tuple[Array, Array]:
         """Cosine of incidence, and how deep in the vessel a place lies, 0 to 1; only where the sensor asks."""

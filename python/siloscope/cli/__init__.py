@@ -42,6 +42,9 @@ COMMANDS: tuple[Command, ...] = (
     Command("check-volume", "check_volume:check", "Check volumes by conservation: measured beside moved."),
     Command("reconcile", "reconcile:reconcile", "Match weighbridge tickets with a track: the lot's density."),
     Command("plan", "plan:plan_command", "Plan where to hang a camera: the deviations to expect by place."),
+    Command(
+        "validate", "validate:validate_command", "Check on your own frames whether a calibration's deviations hold."
+    ),
     Command("reproduce", "reproduce:reproduce", "Repeat the paper's tables and figures, ours beside theirs."),
     Command("pack", "pack:pack", "Seal frames in Zarr shards beside a manifest, for many machines."),
     Command("fleet", "fleet:fleet", "Measure many sealed frames on many machines: plan, run, compare, publish."),

@@ -1,6 +1,7 @@
 //! The surface fit.
 
 mod fit;
+mod tiles;
 mod warm_start;
 
 use crate::arrays;
@@ -71,6 +72,7 @@ pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<WallDiagnostics>()?;
     m.add_class::<Coverage>()?;
     m.add_class::<WarmStart>()?;
+    tiles::register(m)?;
     m.add_function(wrap_pyfunction!(fit_depth, m)?)?;
     m.add_function(wrap_pyfunction!(fit_points, m)?)
 }

@@ -5,6 +5,7 @@
 //! 3. `select`: Laplace evidence of every `model`, and the mean over them;
 //! 4. `answer`: refusals, and the answer in the parameters that frames share.
 
+pub mod against;
 pub mod answer;
 pub mod average;
 pub mod correlation;

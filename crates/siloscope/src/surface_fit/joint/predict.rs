@@ -147,6 +147,12 @@ impl<'a> Predictor<'a> {
         (depth < FARTHEST).then(|| (depth, self.caster.incidence(d, depth, part), bulge))
     }
 
+    /// Reading of the wall with its form on a told ray, metres; `None` where it is not met.
+    pub fn reading(&self, ray: [f64; 2]) -> Option<f64> {
+        let (depth, ..) = self.meet(&self.caster.turn(self.state.corrected(ray)))?;
+        Some(self.bias.measured(depth)).filter(|reading| reading.is_finite())
+    }
+
     /// Tile `i` against the wall; `None` where its ray misses or grazes it, or where it straddles the joint.
     ///
     /// With `curved` the mean over the tile's pixels takes the place of the wall at its centre; `before` is how the same
