@@ -94,3 +94,12 @@ def test_an_outage_between_two_levels_ends_nothing_and_begins_nothing(service: F
     waits(service, 60)
     told(service, 0.22)
     assert firing(service) == {"low"}
+
+
+def test_a_look_before_the_first_reading_does_not_make_it_late(service: Farm) -> None:
+    """Frames are measured some time after they were taken; the rules may have looked in between."""
+    taken = service.clock.now()
+    waits(service, 2)
+    farm.reading(service, time=taken, fill=0.1)
+    farm.look(service)
+    assert firing(service) == {"low"}

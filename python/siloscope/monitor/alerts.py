@@ -149,6 +149,8 @@ class Alerting:
                 self._step(connection, silo, row, states.get(row.id), seen[row.kind])
 
     def _step(self, connection: Connection, silo: Any, row: Any, before: Any, seen: rules.Value) -> None:
+        if seen.value is None:
+            return  # what is not known leaves all as it is, also up to when it was looked at
         rule = rule_of(row, silo)
         state = rules.State() if before is None else rules.State(before.state, before.since)
         if before is not None and seen.time < before.seen:
