@@ -146,7 +146,7 @@ def test_buckets_and_the_newest_are_of_good_clocks_only(store: Store, tmp_path: 
         readings.add(connection, {**wrong, "volume": 99.0}, None, NOW)
         readings.add(connection, {**wrong, "volume": 99.0, "time": NOW + 300 * DAY}, None, NOW)
         assert readings.last(connection, "silo7", answered=True).time == NOW
-        found = readings.buckets(connection, "silo7", NOW - 2 * DAY, NOW + 1, HOUR)
+        found = readings.buckets(connection, "silo7", readings.Span(NOW - 2 * DAY, NOW + 1), HOUR)
         assert sum(row.number for row in found) == 48
         assert max(row.volume_max for row in found) == 10.0
         assert len(readings.page(connection, "silo7", readings.Span(), None, 100)) == 50

@@ -14,6 +14,7 @@ from siloscope.cli import measure as one
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, print_json, writing
 from siloscope.cli.progress import say
+from siloscope.cli.serve import need_monitor
 from siloscope.errors import UsageError
 from siloscope.fleet import plan as plans
 from siloscope.fleet import running, settings
@@ -174,21 +175,52 @@ def publish(
         str | None,
         typer.Option("--to", metavar="PLACE", help="Whose current.json is moved; the run's own."),
     ] = None,
+    monitor: Annotated[
+        Path | None,
+        typer.Option("--monitor", metavar="DATA", help="Bring it into a service instead: its --data folder."),
+    ] = None,
+    database: Annotated[
+        str | None, typer.Option("--database", metavar="URL", help="With --monitor: the service's --database.")
+    ] = None,
     partial: Annotated[bool, typer.Option("--partial", help="Publish a run that is not complete.")] = False,
     as_json: options.AsJson = False,
 ) -> int:
     """Make a run the current one: readers see all of it, or all of the one before.
 
     [bold]Example:[/bold] siloscope fleet publish runs/march --to s3://mill/readings
+
+    With --monitor, the readings come into a service as a run: they count from then on, and those that they replace are
+    kept. Silos and cameras are those that the frames were packed with. Doing it again changes nothing.
     """
+    from siloscope.fleet.publish import check_complete
     from siloscope.fleet.publish import publish as published
 
+    if monitor is not None:
+        if to is not None:
+            raise UsageError("give --to or --monitor, not both")
+        opened = Opened.of(name)
+        check_complete(opened, partial)
+        return _into_monitor(opened, monitor, database, as_json)
+    if database is not None:
+        raise UsageError("--database is a service's; add --monitor with its data folder")
     document = published(Opened.of(name), to, partial)
     if as_json:
         print_json(document)
     else:
         before = "" if document["previous"] is None else f"; before it {document['previous']}"
         say(f"current is run {document['run']}{before}")
+    return 0
+
+
+def _into_monitor(run: Opened, data: Path, database: str | None, as_json: bool) -> int:
+    need_monitor("a service's readings")
+    from siloscope.fleet.importing import into_monitor
+
+    told = into_monitor(run, data, database)
+    if as_json:
+        print_json(told)
+    else:
+        say(f"it is run {told['monitor_run']} there: {told['added']} readings added, {told['again']} known")
     return 0
 
 

@@ -10,15 +10,25 @@ import typer
 from siloscope.cli import options
 from siloscope.cli.outcome import PARTIAL, print_json
 from siloscope.cli.progress import say, track
-from siloscope.fleet.pack import CAMERA
+from siloscope.cli.serve import need_monitor
+from siloscope.errors import UsageError
+from siloscope.fleet.pack import CAMERA, pack_monitor
 from siloscope.fleet.pack import pack as packed
 from siloscope.io.shard_layout import MOST_FRAMES
 from siloscope.wording import counted
 
 
 def pack(
-    files: Annotated[list[Path], typer.Argument(metavar="FRAMES…", help="Archives, folders, recordings, images.")],
     out: Annotated[str, typer.Option("--out", "-o", metavar="STORE", help="Folder or object store URL (s3://…).")],
+    files: Annotated[
+        list[Path] | None, typer.Argument(metavar="FRAMES…", help="Archives, folders, recordings, images.")
+    ] = None,
+    monitor: Annotated[
+        Path | None, typer.Option("--monitor", metavar="DATA", help="In place of FRAMES: a service's --data folder.")
+    ] = None,
+    database: Annotated[
+        str | None, typer.Option("--database", metavar="URL", help="With --monitor: the service's --database.")
+    ] = None,
     silo: Annotated[
         str | None, typer.Option("--silo", metavar="ID", help="The frames' silo; each file's own name unless given.")
     ] = None,
@@ -42,20 +52,36 @@ def pack(
     was cut off is gone on with by the same command. A folder of single images is a silo by the folder's name. The store
     opens like any other source: `siloscope track STORE --stream silo7 …`. Needs the extra 'fleet'.
 
+    With --monitor, the frames that a service still has are sealed, each camera's with its calibration and the silo's
+    settings, while the service may run; `siloscope fleet publish RUN --monitor DATA` brings a run of them back.
+
     Exit code 5 tells that some frames could not be read.
     """
-    done = packed(
-        files,
-        out,
-        silo=silo,
-        camera_id=camera_id,
-        shard_frames=shard_frames,
-        calibration=calibration,
-        progress=lambda source: track(source, "sealing"),
-        camera=camera,
-        depth_unit=depth_unit,
-        stream=stream,
-    )
+    if (monitor is None) == (not files) or (database is not None and monitor is None):
+        raise UsageError("give frames to be sealed, or --monitor with a service's data folder (and its --database)")
+    if monitor is not None:
+        need_monitor("the frames of a service")
+        done = pack_monitor(
+            monitor,
+            out,
+            database=database,
+            silo=silo,
+            shard_frames=shard_frames,
+            progress=lambda frames: track(frames, "sealing"),
+        )
+    else:
+        done = packed(
+            files or [],
+            out,
+            silo=silo,
+            camera_id=camera_id,
+            shard_frames=shard_frames,
+            calibration=calibration,
+            progress=lambda source: track(source, "sealing"),
+            camera=camera,
+            depth_unit=depth_unit,
+            stream=stream,
+        )
     for problem in done.problems:
         say(f"not read: {problem}")
     if as_json:

@@ -22,6 +22,7 @@ from siloscope.io.shard_layout import MOST_FRAMES
 from siloscope.schema import documents
 from siloscope.tracking.clock import Clock
 from siloscope.types.calibration import Calibration
+from siloscope.types.frame import Frame
 
 CAMERA = "cam"
 """The camera's id unless one is given."""
@@ -86,8 +87,7 @@ def pack(
     UsageError
         For an id or number that can't be.
     """
-    if not 1 <= shard_frames <= MOST_FRAMES:
-        raise UsageError(f"{shard_frames} frames a shard: give 1 to {MOST_FRAMES}")
+    _check_shard(shard_frames)
     store = open_store(place)
     done = Packed(store.place)
     kept = None if calibration is None else _kept(store, Path(calibration))
@@ -100,6 +100,78 @@ def pack(
     made = [(series, w.next_shard, w.slots, w.calibration) for series, w in writers.items()]
     manifest.add(store, made)
     return done
+
+
+def pack_monitor(
+    data: str | Path,
+    place: str | Path,
+    *,
+    database: str | None = None,
+    silo: str | None = None,
+    shard_frames: int = MOST_FRAMES,
+    progress: Callable[[Iterable[Frame]], Iterable[Frame]] = iter,
+) -> Packed:
+    """Seal the frames that a monitor still has, with its calibrations and what it measures its silos with.
+
+    Frames without a calibration, of a clock that can't be right, or that failed, stay out.
+
+    Parameters
+    ----------
+    data : path
+        The folder of ``siloscope serve --data``; the service may run meanwhile.
+    place : path or URL
+        The store; made where it is missing.
+    database : str, optional
+        The service's ``--database``.
+    silo : str, optional
+        One silo alone.
+    shard_frames : int
+        Most frames an object, 1 to `MOST_FRAMES`.
+    progress : callable, optional
+        Is given each camera's frames and gives them on.
+
+    Raises
+    ------
+    InputError
+        For a folder without a monitor's data, or frames unlike those that are in the store.
+    """
+    from siloscope.fleet import monitored
+    from siloscope.fleet.origin import told_of
+
+    _check_shard(shard_frames)
+    store, monitor = open_store(place), monitored.Monitor(Path(data), database)
+    done, writers = Packed(store.place), {}
+    _found(store)
+    try:
+        for found in monitor.measured(silo):
+            told = {"settings": {**told_of(store).get("settings", {})}}
+            told["settings"][as_id(found.silo)] = monitor.settings_of(found.silo)
+            series = monitored.series_of(store, found, told)
+            kept = _kept_document(store, monitored.calibration_of(found))
+            writers[series] = SeriesWriter(store, series, shard_frames, kept)
+            _append(writers[series], progress(monitor.frames(found, done.problems)), done)
+    finally:
+        monitor.close()
+    manifest.add(store, [(series, w.next_shard, w.slots, w.calibration) for series, w in writers.items()])
+    return done
+
+
+def _append(writer: SeriesWriter, frames: Iterable[Frame], done: Packed) -> None:
+    """Seals frames that have their times."""
+    first, name = writer.next_shard, writer.series.name
+    for frame in frames:
+        if writer.append(frame):
+            done.frames += 1
+            done.series[name] = done.series.get(name, 0) + 1
+        else:
+            done.present += 1
+    writer.flush()
+    done.shards += writer.next_shard - first
+
+
+def _check_shard(frames: int) -> None:
+    if not 1 <= frames <= MOST_FRAMES:
+        raise UsageError(f"{frames} frames a shard: give 1 to {MOST_FRAMES}")
 
 
 def _found(store: Store) -> None:
@@ -126,22 +198,21 @@ def _own_name(path: Path) -> str:
 
 
 def _seal(writer: SeriesWriter, source: FrameSource, progress: Progress, done: Packed) -> None:
-    first, name = writer.next_shard, writer.series.name
-    for number, frame in enumerate(progress(source)):
-        time = Clock().time(number, frame.timestamp, frame.source)
-        if writer.append(replace(frame, timestamp=time)):
-            done.frames += 1
-            done.series[name] = done.series.get(name, 0) + 1
-        else:
-            done.present += 1
-    writer.flush()
-    done.shards += writer.next_shard - first
+    timed = (
+        replace(frame, timestamp=Clock().time(number, frame.timestamp, frame.source))
+        for number, frame in enumerate(progress(source))
+    )
+    _append(writer, timed, done)
     done.problems += source.problems
 
 
 def _kept(store: Store, path: Path) -> str:
     """The name of the calibration's copy in the store."""
-    document = documents.text(Calibration.load(path).to_dict() | {"timing_ms": {}}).encode()
+    return _kept_document(store, Calibration.load(path))
+
+
+def _kept_document(store: Store, calibration: Calibration) -> str:
+    document = documents.text(calibration.to_dict() | {"timing_ms": {}}).encode()
     name = f"calibrations/{hashlib.sha256(document).hexdigest()}.json"
     store.create(name, document)
     return name

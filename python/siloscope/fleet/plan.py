@@ -11,6 +11,7 @@ from typing import Any
 from siloscope.errors import InputError, UsageError
 from siloscope.fleet import shard_table
 from siloscope.fleet.naming import RunPaths, Series
+from siloscope.fleet.origin import told_of
 from siloscope.fleet.places import open_store
 from siloscope.fleet.settings import Settings
 from siloscope.fleet.shard_table import ShardTable
@@ -66,13 +67,14 @@ def make(store_place: str | Path, out: str | Path, calibrations: Path | None, se
     calibrations : path, optional
         A folder with ``<silo>.json``, or ``<silo>.<camera>.json``. They win over those that were packed with frames.
     settings : Settings
-        What to measure with.
+        What to measure with; wins over what a monitor's frames were packed with.
     """
     store, place = open_store(store_place), open_store(out)
     table = shard_table.scan(store)
     texts = _calibrations(store, table, calibrations)
     hashes = {name: hashlib.sha256(text).hexdigest() for name, text in sorted(texts.items())}
-    plan = Plan("", _version(), store.place, settings, hashes)
+    packed = told_of(store).get("settings", {})
+    plan = Plan("", _version(), store.place, settings.over(packed), hashes)
     plan = replace(plan, run=_id(plan))
     for series in table.series:
         if series.name in texts:

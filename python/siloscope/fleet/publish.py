@@ -29,12 +29,7 @@ def publish(run: Opened, to: str | None = None, partial: bool = False) -> dict[s
     InputError
         Where the place can't be written, or others keep moving it.
     """
-    left = int((~run.state.measured).sum())
-    if left and not partial:
-        raise UsageError(
-            f"{left} of {len(run.table)} shards of run {run.plan.run} lack; do them with `siloscope fleet run`, or "
-            "publish what there is with --partial"
-        )
+    check_complete(run, partial)
     place = run.place if to is None else open_store(to)
     for _ in range(ATTEMPTS):
         version = place.version(CURRENT)
@@ -42,6 +37,16 @@ def publish(run: Opened, to: str | None = None, partial: bool = False) -> dict[s
         if place.exchange(CURRENT, version, document_bytes(document)):
             return document
     raise InputError(f"{place.place}/{CURRENT}: others keep moving it; publish again")
+
+
+def check_complete(run: Opened, partial: bool) -> None:
+    """Raises `UsageError` for a run that is not complete, unless `partial` allows it."""
+    left = int((~run.state.measured).sum())
+    if left and not partial:
+        raise UsageError(
+            f"{left} of {len(run.table)} shards of run {run.plan.run} lack; do them with `siloscope fleet run`, or "
+            "publish what there is with --partial"
+        )
 
 
 def current(place: Store) -> dict[str, Any]:

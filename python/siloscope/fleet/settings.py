@@ -6,7 +6,7 @@ import hashlib
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,11 @@ class Settings:
         """What a silo is measured with; files as ``{"name": …, "text": …}``."""
         return {**self.measure, **self.silos.get(silo, {})}
 
+    def over(self, packed: dict[str, Table]) -> Settings:
+        """The same, over what was packed with the frames of some silos."""
+        silos = {silo: {**table, **self.measure, **self.silos.get(silo, {})} for silo, table in packed.items()}
+        return replace(self, silos={**self.silos, **silos})
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data."""
         return {"measure": self.measure, "silos": self.silos, "located_frames": self.located_frames}
@@ -49,7 +54,7 @@ def settings(path: Path | None, **given: Any) -> Settings:
     """The settings of a file (None: there is none), with single ones over those of all silos."""
     read = schema.FleetFile() if path is None else schema.read(path)
     base = Path() if path is None else path.parent
-    common = {**_table(read.measure, base), **{k: v for k, v in _with_texts(given, Path()).items() if v is not None}}
+    common = {**_table(read.measure, base), **{k: v for k, v in with_texts(given, Path()).items() if v is not None}}
     silos = {silo: _table(table, base) for silo, table in sorted(read.silo.items())}
     return Settings(common, silos, read.locate.frames or LOCATED_FRAMES)
 
@@ -58,10 +63,11 @@ def _table(told: schema.Measuring, base: Path) -> Table:
     known = {name: value for name, value in told.model_dump().items() if value is not None}
     if "moisture" in known:
         known["moisture"] /= 100.0
-    return _with_texts(known, base)
+    return with_texts(known, base)
 
 
-def _with_texts(table: Table, base: Path) -> Table:
+def with_texts(table: Table, base: Path) -> Table:
+    """Settings with the text of every file that they name."""
     return {name: _text_of(value, base) if name in _FILES else value for name, value in table.items()}
 
 

@@ -133,7 +133,7 @@ def measured(job: MeasureJob) -> Measured:
     from siloscope.measure import measure
 
     start = time.perf_counter()
-    frame = _frame(job.path, job.camera)
+    frame = frame_of(job.path, job.camera)
     density = None if job.product is None else Density(**job.product)
     content = measure(frame, _calibration(job.calibration), sensor=job.camera.sensor, product=density, **job.vessel)
     return Measured(reading(content), packed_surface(content.surface), time.perf_counter() - start)
@@ -144,7 +144,7 @@ def calibrated(job: CalibrateJob) -> Calibrated:
     from siloscope.calibrate import calibrate
 
     told = job.vessel
-    frames = (_frame(path, job.camera) for path in job.paths)
+    frames = (frame_of(path, job.camera) for path in job.paths)
     found = calibrate(frames, sensor=job.camera.sensor, diameter=told.get("diameter"), bottom=told.get("bottom"))
     return Calibrated(found.to_dict(), found.ok, found.message)
 
@@ -154,7 +154,7 @@ def looked(job: LookJob) -> Looked:
     from siloscope.locate import locate
     from siloscope.monitor.picture import drawn
 
-    frame = _frame(job.path, job.camera)
+    frame = frame_of(job.path, job.camera)
     found = locate(frame, sensor=job.camera.sensor, ratios=False).to_dict()
     names = ("status", "reason", "message", "r_x", "r_y", "t_x", "t_y", "std")
     return Looked({name: found.get(name) for name in names}, drawn(frame))
@@ -168,7 +168,7 @@ WORK: dict[type, Callable[[Any], Measured | Calibrated | Looked]] = {
 """What is done for a job."""
 
 
-def _frame(path: Path, camera: CameraSettings) -> Any:
+def frame_of(path: Path, camera: CameraSettings) -> Any:
     """The first frame of a file."""
     import siloscope.io
 

@@ -447,6 +447,12 @@ export interface PageRule {
   next: string | null;
 }
 
+export interface PageRun {
+  items: Run[];
+  /** Cursor of what follows; null at the end. Give it as `after`. */
+  next: string | null;
+}
+
 export interface PageSilo {
   items: Silo[];
   /** Cursor of what follows; null at the end. Give it as `after`. */
@@ -621,6 +627,25 @@ export interface RuleChange {
   delay_s?: number | null;
   channels?: string[] | null;
   enabled?: boolean | null;
+}
+
+/** What measured readings of a silo; the readings of an older run stay beside those that replaced them. */
+export interface Run {
+  id: number;
+  /** Of siloscope. */
+  version: string;
+  /** Hash of the settings; of an imported run its id. */
+  config: string;
+  /** measured, recomputed, fleet (imported), edge, simulated. */
+  origin: string;
+  created: string;
+  note: string | null;
+  /** Readings that count. */
+  current: number;
+  /** Readings that a later run replaced. */
+  replaced: number;
+  first: string;
+  last: string;
 }
 
 /** Who is signed in. */

@@ -1,7 +1,7 @@
 /** A silo's calibrations: which one is in force, which waits for a person's word, and what came before. */
 import { atLeast } from "../context.ts";
-import type { Calibration, CameraState, PageOf, Silo } from "../data/answers.ts";
-import { change } from "../data/client.ts";
+import type { Calibration, CameraState, PageOf, Run, Silo } from "../data/answers.ts";
+import { api, change } from "../data/client.ts";
 import { changed, useResource } from "../data/resources.ts";
 import { fullMoment } from "../format/dates.ts";
 import { useWords } from "../i18n/index.ts";
@@ -31,6 +31,7 @@ export function Calibrations({ silo }: { silo: Silo }) {
           ))}
       </ul>
       {found.data && rows.length === 0 && <p class="note">{t("calibration.none")}</p>}
+      <Runs silo={silo} />
     </>
   );
 }
@@ -95,5 +96,36 @@ function Line({ calibration, silo }: { calibration: Calibration; silo: Silo }) {
         {confirmed_by && ` · ${t("calibration.by", { name: confirmed_by })}`}
       </span>
     </li>
+  );
+}
+
+/** What measured the readings: the runs whose readings count, and those that later ones replaced. */
+function Runs({ silo }: { silo: Silo }) {
+  const { t, named, locale } = useWords();
+  const path = `silos/${encodeURIComponent(silo.id)}`;
+  const found = useResource<PageOf<Run>>(
+    atLeast(silo.role, "viewer") ? `${path}/runs` : null,
+    "reading",
+    `of:${silo.id}`,
+  );
+  const rows = found.data?.items ?? [];
+  if (rows.length === 0) return null;
+  return (
+    <section class="runs" aria-label={t("runs.title")}>
+      <h3>{t("runs.title")}</h3>
+      <ul class="plain">
+        {rows.map((run) => (
+          <li key={run.id}>
+            <strong>{run.current > 0 ? named("origin", run.origin) : t("runs.replaced")}</strong> · siloscope{" "}
+            {run.version} · {fullMoment(locale, Date.parse(run.created), silo.zone)}
+            <br />
+            <span class="quiet small">
+              {t("runs.count", { current: run.current, replaced: run.replaced })} ·{" "}
+              <a href={api(`${path}/readings?run=${run.id}&format=csv`)}>CSV</a>
+            </span>
+          </li>
+        ))}
+      </ul>
+    </section>
   );
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Iterator
+from dataclasses import replace
 from importlib import import_module
 from typing import Annotated, Any, Literal
 
@@ -17,7 +18,7 @@ from siloscope.monitor.api.models.base import Time
 from siloscope.monitor.clock import DAY, SECOND, iso
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.service import Service
-from siloscope.monitor.store import readings
+from siloscope.monitor.store import readings, runs
 
 router = APIRouter(tags=["readings"])
 
@@ -65,11 +66,12 @@ def get_readings(
     until: Annotated[Time | None, Query(alias="to", description="Time behind the last one.")] = None,
     buckets: Annotated[int | None, Query(ge=1, le=MOST_BUCKETS, description="Means over so many stretches.")] = None,
     format: Literal["json", "csv", "parquet"] = "json",
+    run: Annotated[int | None, Query(ge=1, le=(1 << 31) - 1, description="Of this run, also what it lost.")] = None,
     after: After = None,
     count: Count = 200,
 ) -> Any:
-    """Readings in the order of their times."""
-    span = readings.Span(micros_of(since, "from"), micros_of(until, "to"))
+    """Readings in the order of their times: those that count, or those of one run."""
+    span = readings.Span(micros_of(since, "from"), micros_of(until, "to"), run)
     if buckets is not None:
         return _trend(silo.row.id, connection, service, span, buckets, silo.percent_only)
     if silo.percent_only and format != "json":
@@ -86,6 +88,14 @@ def get_readings(
         items = [views.only_percent(item) for item in items]
     last = rows[count - 1] if len(rows) > count else None
     return models.Page[models.Reading](items=items, next=None if last is None else f"{last.time}-{last.id}")
+
+
+@router.get("/silos/{silo}/runs", response_model=models.Page[models.Run], responses=refusals("not-found", "forbidden"))
+def get_runs(silo: SiloOf, connection: Reading) -> models.Page[models.Run]:
+    """What measured the silo's readings, the newest first: program, settings, recomputations, imported runs."""
+    if silo.percent_only:
+        raise Problem("forbidden", "this needs the role viewer")
+    return models.Page(items=[views.run(row) for row in runs.of_silo(connection, silo.row.id)])
 
 
 def _cursor(after: str | None) -> tuple[int, int] | None:
@@ -109,7 +119,7 @@ def _trend(
     if since >= until:
         raise Problem("invalid", "'from' is not before 'to'")
     width = max(1, -(-(until - since) // count))
-    rows = readings.buckets(connection, silo, since, until, width)
+    rows = readings.buckets(connection, silo, replace(span, since=since, until=until), width)
     items = [_bucket(row, since, width) for row in rows]
     if percent_only:
         items = [views.only_percent(item) for item in items]

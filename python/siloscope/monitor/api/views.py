@@ -175,6 +175,13 @@ def calibration(row: Any) -> models.Calibration:
     return models.Calibration(**{name: getattr(row, name) for name in names}, **times)
 
 
+def run(row: dict[str, Any]) -> models.Run:
+    """A run with its readings of a silo."""
+    times = {name: at(row[name]) for name in ("created", "first", "last")}
+    names = ("id", "version", "config", "origin", "note", "current", "replaced")
+    return models.Run(**{name: row[name] for name in names}, **times)
+
+
 def silo(connection: Connection, row: Any, cameras: list[Any], role: str, time: int) -> models.Silo:
     """A silo with what a card shows."""
     firing = alerts.listed(connection, silo=row.id, firing=True, before=None, count=100)

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Select, delete, func, insert, select, update
+from sqlalchemy import Connection, Select, delete, exists, func, insert, or_, select, update
 
 from siloscope.monitor.clock import SUSPECT
 from siloscope.monitor.store import changes
@@ -21,11 +21,14 @@ class Span:
 
     since: int | None = None
     until: int | None = None
+    run: int | None = None
+    """Of this run alone, whether its readings still count or not."""
 
 
 def current(silo: str, span: Span = Span(), *, suspect: bool = False) -> list[Any]:
     """Conditions of a silo's readings that no later run replaced; those of a wrong clock only where asked for."""
-    chosen = [reading.c.silo == silo, reading.c.superseded.is_(None)]
+    chosen = [reading.c.silo == silo]
+    chosen.append(reading.c.superseded.is_(None) if span.run is None else reading.c.run == span.run)
     if not suspect:
         chosen.append(reading.c.clock != SUSPECT)
     if span.since is not None:
@@ -63,10 +66,11 @@ def every(connection: Connection, silo: str, span: Span) -> Iterator[Record]:
     yield from connection.execution_options(yield_per=2000).execute(wanted)
 
 
-def buckets(connection: Connection, silo: str, since: int, until: int, width: int) -> Sequence[Record]:
-    """Means and extremes of the answered readings in stretches of a width (µs); stretches without any are left out."""
-    number = (reading.c.time - since) // width
-    chosen = [*current(silo, Span(since, until)), reading.c.status == "ok"]
+def buckets(connection: Connection, silo: str, span: Span, width: int) -> Sequence[Record]:
+    """Means and extremes of the answered readings in stretches of a width (µs) from a span's beginning; stretches
+    without any are left out."""
+    number = (reading.c.time - span.since) // width
+    chosen = [*current(silo, span), reading.c.status == "ok"]
     columns = [
         number.label("bucket"),
         func.count().label("number"),
@@ -107,12 +111,16 @@ def insert_many(connection: Connection, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def surface_at(connection: Connection, silo: str, time: int) -> Record | None:
-    """The newest surface up to a time, with its reading."""
+    """The newest surface up to a time, with its reading: one that counts, or one that a reading without a surface
+    replaced, as those of an imported run are."""
+    after = surface.alias()
+    bare = ~exists().where(after.c.reading == reading.c.superseded)
     wanted: Select[Any] = (
         select(surface.c.blob, reading)
         .join(reading, reading.c.id == surface.c.reading)
-        .where(surface.c.silo == silo, surface.c.time <= time, *current(silo))
-        .order_by(surface.c.time.desc())
+        .where(surface.c.silo == silo, surface.c.time <= time, reading.c.clock != SUSPECT)
+        .where(or_(reading.c.superseded.is_(None), bare))
+        .order_by(surface.c.time.desc(), surface.c.reading.desc())
         .limit(1)
     )
     return connection.execute(wanted).one_or_none()

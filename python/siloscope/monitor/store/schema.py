@@ -36,6 +36,10 @@ CURRENT = "superseded IS NULL"
 """Readings that no later run has replaced."""
 
 
+REPLACED = "superseded IS NOT NULL"
+"""Readings that one has."""
+
+
 def number() -> Column[int]:
     return Column("id", NUMBER, primary_key=True, autoincrement=True)
 
@@ -196,6 +200,12 @@ reading = Table(
     Column("quality", JSON, nullable=False),
     UniqueConstraint("frame", "run"),
     Index("ix_reading_frame", "frame"),
+    Index(
+        "ix_reading_replaced",
+        *("silo", "run", "time"),
+        sqlite_where=text(REPLACED),
+        postgresql_where=text(REPLACED),
+    ),
     Index(
         "ix_reading_current",
         *("silo", "time", "status", "clock", "volume", "volume_std", "fill", "mass"),

@@ -53,7 +53,7 @@ from siloscope.monitor.api.models.settings import (
     Ticket,
     VesselChange,
 )
-from siloscope.monitor.api.models.things import Calibration, Camera, Change, Health, Place, Product, Silo, Site
+from siloscope.monitor.api.models.things import Calibration, Camera, Change, Health, Place, Product, Run, Silo, Site
 
 __all__ = [
     "Acknowledgement",
@@ -102,6 +102,7 @@ __all__ = [
     "RoleAt",
     "Rule",
     "RuleChange",
+    "Run",
     "Session",
     "SignIn",
     "Silo",

@@ -83,6 +83,21 @@ class Calibration(Model):
     confirmed_by: str | None
 
 
+class Run(Model):
+    """What measured readings of a silo; the readings of an older run stay beside those that replaced them."""
+
+    id: int
+    version: str = Field(description="Of siloscope.")
+    config: str = Field(description="Hash of the settings; of an imported run its id.")
+    origin: str = Field(description="measured, recomputed, fleet (imported), edge, simulated.")
+    created: datetime
+    note: str | None
+    current: int = Field(description="Readings that count.")
+    replaced: int = Field(description="Readings that a later run replaced.")
+    first: datetime
+    last: datetime
+
+
 class Site(Model):
     """The whole installation, and who asks."""
 
