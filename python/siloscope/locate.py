@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from os import PathLike
 from pathlib import Path
 
@@ -13,9 +14,10 @@ from siloscope.errors import UsageError
 from siloscope.estimation import contradictions, second_look
 from siloscope.estimation.input_checks import input_remarks
 from siloscope.estimation.inputs import prepare
-from siloscope.estimation.methods import METHODS
+from siloscope.estimation.methods import FEW_TILES, METHODS
 from siloscope.estimation.settings import Number, Settings
 from siloscope.estimation.steps import NEIGHBOURS
+from siloscope.estimation.unused_options import unused_options
 from siloscope.estimation.vessel_checks import vessel_remarks
 from siloscope.io.given import given_frame
 from siloscope.sensors import SensorProfile
@@ -74,7 +76,8 @@ def locate(
     crop : (xmin, xmax, ymin, ymax, zmin, zmax), optional
         Box in the camera frame, metres; only points inside are used.
     grid : float, optional
-        Side of the voxel grid's cells, m; `siloscope.estimation.steps.GRID` (step 1), or less for small clouds.
+        Side of the voxel grid's cells, m; `siloscope.estimation.steps.GRID` (step 1), or less for small clouds. To the
+        method ``surface`` it lets the points of a small cloud answer where the image of its rays shows no wall.
     neighbours : int
         Neighbours for normals and shape tensors (method ``shape-tensor``).
     threads : int
@@ -124,8 +127,8 @@ def locate(
         trust=trust,
     )
     data = given_frame(data, camera, depth_unit)
-    clouds = "resampled" if method == "surface" and grid is None else "points"
-    prepared = prepare(data, camera, profile, depth_unit=depth_unit, mask=mask, crop=crop, clouds=clouds)
+    brought = partial(prepare, data, camera, profile, depth_unit=depth_unit, mask=mask, crop=crop)
+    prepared = brought(clouds="resampled" if method == "surface" else "points")
     settings = settings.with_gravity_of(prepared)
     config = settings.effective(method, prepared)
     found = input_remarks(data, prepared, profile, depth_unit)
@@ -133,7 +136,11 @@ def locate(
     if against is not None:
         return against
     estimate = run(prepared, settings, config)
+    if grid is not None and method == "surface" and estimate.reason in FEW_TILES and prepared.turn is not None:
+        prepared = brought(clouds="rays")
+        estimate = run(prepared, settings, settings.effective(method, prepared))
     if method == "surface":
         estimate, more = second_look.looked_at_again(run, estimate, prepared, settings)
         found = (*found, *more, *vessel_remarks(estimate, known))
+    found = (*found, *unused_options(estimate, prepared, settings))
     return contradictions.judged(estimate, found, settings.trust)

@@ -193,6 +193,10 @@ INPUT_REMARKS: dict[str, tuple[str, str]] = {
         "check the tape, the depth unit and the camera file: the colour camera's intrinsics do not fit depth; "
         "trust diameter takes the diameter's word",
     ),
+    "option-unused": (
+        "an option was given that can't act on this input",
+        "leave it out, or see its help for what it acts on",
+    ),
     "gravity-contradicts": (
         "the silo's axis is not along gravity",
         "check gravity's signs and that it is in the camera's frame; trust gravity keeps the answer",
@@ -223,6 +227,7 @@ NOTES = (
     "filling-in-progress",
     "millimetre-depth-unit",
     "axes-found",
+    "option-unused",
 )
 """Codes that only inform; the others warn."""
 

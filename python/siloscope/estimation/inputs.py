@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from siloscope import _core
 from siloscope.errors import InputError, UsageError
 from siloscope.estimation.pixel_lattice import image_of
-from siloscope.estimation.virtual_image import image_from_origin
+from siloscope.estimation.virtual_image import camera_at_origin, image_from_origin
 from siloscope.io.orientation import Turn, optical, turn_of
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import Camera
@@ -27,6 +27,9 @@ FARTHEST_CLOUD = 10_000.0
 
 PIXELS, RESAMPLED = "the image that its rays are of", "resampled as seen from the origin"
 """How a cloud became a depth image."""
+
+FROM_ORIGIN = "from the origin"
+"""Where the rays of a cloud that is no camera's begin, if it was seen from one place."""
 
 SENTINEL = 65535
 """Raw 16-bit depth that means "no measurement"."""
@@ -42,6 +45,8 @@ class PreparedDepth:
     config: dict[str, Any]
     turn: Turn | None = None
     """How the cloud was turned that it was made of; None for images."""
+    camera_given: bool = False
+    """Whether the caller gave the camera; a recording's own is of its stream."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +58,8 @@ class PreparedPoints:
     config: dict[str, Any]
     turn: Turn | None = None
     """How it was turned."""
+    camera: Camera | None = None
+    """One in whose place a sensor at the origin has seen them; None where none is known to have."""
 
 
 Prepared = PreparedDepth | PreparedPoints
@@ -72,8 +79,8 @@ def prepare(
     """Check a frame and bring it into one form.
 
     A cloud is turned to the optical frame. `clouds` says what becomes of it then: "points" leave it one, and "as is"
-    does so in its own frame; "pixels" make the depth image of it that it was, where its rays are a pinhole camera's;
-    "resampled" make one of any cloud that was seen from its origin.
+    does so in its own frame; "rays" leave it one and find the camera; "pixels" make the depth image of it that it was,
+    where its rays are a pinhole camera's; "resampled" make one of any cloud that was seen from its origin.
 
     Raises
     ------
@@ -84,6 +91,7 @@ def prepare(
         For a crop box that is none.
     """
     frame = data if isinstance(data, Frame) else _frame(data, camera)
+    given = camera is not None or str(frame.provenance.get("camera_from", "")).startswith("given")
     frame = replace(
         frame, camera=camera or frame.camera, depth_unit=frame.depth_unit if depth_unit is None else depth_unit
     )
@@ -92,7 +100,7 @@ def prepare(
     if frame.points is not None:
         turned = frame if clouds == "as is" else optical(frame)
         return _prepare_points(turned, mask, box, config, clouds)
-    return _prepare_depth(frame, profile, mask, box, config)
+    return replace(_prepare_depth(frame, profile, mask, box, config), camera_given=given)
 
 
 def _prepare_points(
@@ -112,12 +120,16 @@ def _prepare_points(
     points = points if box is None else points[within(points, box)]
     _not_empty(len(points), frame.source)
     _near_the_sensor(points, frame.source)
-    found, how = (image_of(points) if clouds in ("pixels", "resampled") else None), PIXELS
+    found, how = (None if clouds in ("points", "as is") else image_of(points)), PIXELS
     if found is None and clouds == "resampled":
         found, how = image_from_origin(points), RESAMPLED
-    if found is None:
-        return PreparedPoints(np.ascontiguousarray(points), frame.gravity, config, turn)
-    return PreparedDepth(*found, frame.gravity, config | {"cloud": how}, turn)
+    if found is not None and clouds != "rays":
+        return PreparedDepth(*found, frame.gravity, config | {"cloud": how}, turn)
+    camera = None if found is None else found[1]
+    if camera is None and clouds in ("rays", "resampled"):
+        camera = camera_at_origin(points)
+        config = config if camera is None else config | {"rays": FROM_ORIGIN}
+    return PreparedPoints(np.ascontiguousarray(points), frame.gravity, config, turn, camera)
 
 
 def _prepare_depth(

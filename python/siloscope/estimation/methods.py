@@ -10,11 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope.estimation import shape_tensor, surface
+from siloscope.estimation.cloud_uncertainty import WARP, SensorStd
 from siloscope.estimation.inputs import Prepared, PreparedPoints
 from siloscope.estimation.priors import CLOUD, Priors
 from siloscope.estimation.settings import Settings
-from siloscope.sensors import SensorProfile
+from siloscope.sensors import UNKNOWN, SensorProfile
 from siloscope.types.estimate import Estimate, SurfaceDetails
+
+FEW_TILES = ("no-wall", "no-depth", "direction-unknown", "position-unknown", "poorly-determined")
+"""Refusals of a cloud's image whose points may still show a wall: the image of a small thing has few tiles."""
 
 
 def priors_of(frame: Prepared, settings: Settings) -> Priors:
@@ -31,10 +35,21 @@ def _surface(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Est
     priors = priors_of(frame, settings)
     if isinstance(frame, PreparedPoints):
         points = _unbiased(frame.points, settings.profile)
-        return surface.fit_points(points, priors, grid=settings.grid, threads=settings.threads, config=config)
+        sensor = _sensor_of(frame, settings)
+        return surface.fit_points(
+            points, priors, grid=settings.grid, threads=settings.threads, sensor=sensor, config=config
+        )
     start, ratios = settings.start, settings.ratios
     estimate = surface.fit_depth(frame.depth, frame.camera, priors, start=start, ratios=ratios, config=config)
     return estimate if frame.turn is None else _of_a_cloud(estimate)
+
+
+def _sensor_of(frame: PreparedPoints, settings: Settings) -> SensorStd | None:
+    """What the sensor may have done to all points of a cloud; None where no place is known that has seen it."""
+    if frame.camera is None:
+        return None
+    camera_std = settings.intrinsics_std(frame).of_rays(frame.camera)
+    return SensorStd(settings.profile.bias_std, camera_std, WARP if settings.profile is UNKNOWN else 0.0)
 
 
 def _unbiased(points: NDArray[np.float64], profile: SensorProfile) -> NDArray[np.float64]:

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from siloscope.errors import UsageError
 from siloscope.estimation.contradictions import trusted
-from siloscope.estimation.inputs import RESAMPLED, Prepared, PreparedDepth
+from siloscope.estimation.inputs import FROM_ORIGIN, RESAMPLED, Prepared, PreparedDepth
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import is_number
 from siloscope.types.estimate import Estimate
@@ -42,6 +42,8 @@ class Settings:
     vessels: str
     trust: frozenset[str] = frozenset()
     """Codes of contradictions that only warn."""
+    gravity_given: bool = False
+    """Whether gravity is the caller's, not the frame's own."""
     gravity_is_behind: bool = False
     """Whether gravity points out of the camera's back, and was turned round."""
 
@@ -83,24 +85,26 @@ class Settings:
         to point forward. What an image's recording says stays, and the fit refuses a camera above the horizon.
         """
         turn = prepared.turn
+        given = self.gravity is not None
         if self.gravity is None:
             down = None if prepared.gravity is None else _direction(prepared.gravity)
         else:
             down = self.gravity if turn is None else turn.rotation @ self.gravity
         recorded = self.gravity is None and isinstance(prepared, PreparedDepth)
         if down is None or down[2] >= 0.0 or recorded:
-            return replace(self, gravity=down)
-        return replace(self, gravity=-down, gravity_is_behind=True)
+            return replace(self, gravity=down, gravity_given=given)
+        return replace(self, gravity=-down, gravity_given=given, gravity_is_behind=True)
 
-    def intrinsics_std(self, frame: PreparedDepth) -> IntrinsicsStd:
+    def intrinsics_std(self, frame: Prepared) -> IntrinsicsStd:
         """How exactly the intrinsics of a frame are known; of a cloud's rays as of a calibrated camera's."""
-        if self.vessels == "coaxial":
+        if self.vessels == "coaxial" or frame.camera is None:
             return EXACT
         if isinstance(self.intrinsics, IntrinsicsStd):
             return self.intrinsics
         if self.intrinsics is None and frame.camera.intrinsics_std is not None:
             return frame.camera.intrinsics_std
-        if frame.config.get("cloud") == RESAMPLED:
+        free_rays = frame.config.get("cloud") == RESAMPLED or frame.config.get("rays") == FROM_ORIGIN
+        if free_rays and self.intrinsics in (None, "calibrated"):
             return IntrinsicsStd(CALIBRATED.f, RAY_STD * frame.camera.fx, CALIBRATED.k1)
         name = self.intrinsics or ("nominal" if "intrinsics" in frame.config else "calibrated")
         return self.profile.nominal_std(frame.camera) if name == "nominal" else named(name, frame.camera)

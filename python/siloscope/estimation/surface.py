@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
+from siloscope.estimation.cloud_uncertainty import SensorStd, sensor_covariance
 from siloscope.estimation.priors import DEPTH_BIAS, Priors
 from siloscope.estimation.steps import cell_size
 from siloscope.parameters import BIAS, OVALITY, PARAMETERS
@@ -59,6 +60,7 @@ def fit_points(
     *,
     grid: float | None = None,
     threads: int = 1,
+    sensor: SensorStd | None = None,
     config: dict[str, Any] | None = None,
 ) -> Estimate:
     """Fit the wall to a cloud, seen from inside or outside.
@@ -74,21 +76,28 @@ def fit_points(
         Side of the voxel grid's cells in metres; None for `cell_size`.
     threads : int
         Threads for what can be shared.
+    sensor : SensorStd, optional
+        What the sensor may have done to all points, where one in the origin has seen them.
     config : dict, optional
         Effective settings to record in the estimate.
     """
     found = _core.fit_points(points, priors, grid or cell_size(points), threads)
     if isinstance(found, _core.Refusal):
         return refused("surface", found, config)
-    return _estimate(found, priors, config)
+    more = None if sensor is None else sensor_covariance(found, sensor)
+    return _estimate(found, priors, config, more=more)
 
 
 def _estimate(
-    fit: _core.SurfaceFit, priors: Priors, config: dict[str, Any] | None, labels: PixelLabels | None = None
+    fit: _core.SurfaceFit,
+    priors: Priors,
+    config: dict[str, Any] | None,
+    labels: PixelLabels | None = None,
+    more: NDArray[np.float64] | None = None,
 ) -> Estimate:
     values = dict(zip(PARAMETERS, (v if np.isfinite(v) else None for v in fit.parameters.tolist()), strict=True))
     pose = SiloPose(*(float(v) for v in fit.parameters[:4]))
-    covariance = fit.covariance
+    covariance = fit.covariance if more is None else fit.covariance + more
     slope, intercept = values["cone_slope"], values["cone_intercept"]
     cone = None if slope is None or intercept is None else (slope, intercept)
     silo, silo_std = geometry_of(values["radius"], cone, covariance)

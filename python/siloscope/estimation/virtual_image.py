@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,9 @@ from siloscope.types.camera import Camera
 
 FEWEST = 4_000
 """Points below which a cloud stays one."""
+
+FEWEST_RAYS = 200
+"""Points below which nothing is said of where a cloud was seen from."""
 
 WIDEST = 2.5
 """Tangent of the largest angle between a ray and the optical axis."""
@@ -40,25 +44,48 @@ def image_from_origin(points: NDArray[np.float64]) -> tuple[NDArray[np.float32],
     A pixel takes the point nearest to its centre, moved onto its ray in the plane of the points around it: along a
     plane 1/z is linear in the rays. So noise stays what it is, and the rays of the points need not be a camera's.
     """
+    seen = _seen(points)
+    if seen is None or len(seen.inverse) < FEWEST:
+        return None
+    shape = seen.camera.height, seen.camera.width
+    chosen = _nearest(seen.number, (seen.off**2).sum(axis=1), shape[0] * shape[1])
+    return _onto_rays(chosen, seen.off, seen.inverse, shape), seen.camera
+
+
+def camera_at_origin(points: NDArray[np.float64]) -> Camera | None:
+    """A camera in the place of the sensor that saw points (N, 3) in an optical frame; None where no one place did."""
+    ahead = float(np.mean(points[:, 2] > 0.0)) if len(points) else 0.0
+    seen = _seen(points) if ahead > LEAST_INSIDE else None
+    return None if seen is None else seen.camera
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """Points on the pixels of a camera at the origin: each one's pixel, place beside its centre, and 1/z, 1/m."""
+
+    camera: Camera
+    number: NDArray[np.int64]
+    off: NDArray[np.float64]
+    inverse: NDArray[np.float64]
+
+
+def _seen(points: NDArray[np.float64]) -> _Seen | None:
     points = points[points[:, 2] > 0.0]
     ratios = points[:, :2] / points[:, 2:]
     inside = (np.abs(ratios) < WIDEST).all(axis=1)
-    if inside.sum() < max(FEWEST, LEAST_INSIDE * len(points)):
+    if inside.sum() < max(FEWEST_RAYS, LEAST_INSIDE * len(points)):
         return None
     points, ratios = points[inside], ratios[inside]
     first = ratios.min(axis=0)
     f = _pixels_per_ray(ratios - first)
     width, height = (int(n) + 1 for n in np.ceil((ratios.max(axis=0) - first) * f))
-    camera = Camera(width, height, f, f, -float(first[0]) * f, -float(first[1]) * f)
     places = (ratios - first) * f
     cells = np.rint(places).astype(np.int64)
-    number = cells[:, 1] * width + cells[:, 0]
-    off = places - cells
-    inverse = 1.0 / points[:, 2]
+    number, inverse = cells[:, 1] * width + cells[:, 0], 1.0 / points[:, 2]
     if _seen_through(number, inverse, width * height):
         return None
-    chosen = _nearest(number, (off**2).sum(axis=1), width * height)
-    return _onto_rays(chosen, off, inverse, (height, width)), camera
+    camera = Camera(width, height, f, f, -float(first[0]) * f, -float(first[1]) * f)
+    return _Seen(camera, number, places - cells, inverse)
 
 
 def _pixels_per_ray(ratios: NDArray[np.float64]) -> float:

@@ -61,3 +61,9 @@ class SiloPose:
         T = self.T_silo_camera
         moved: NDArray[np.float64] = points @ T[:3, :3].T + T[:3, 3]
         return moved
+
+    def to_camera(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Points (..., 3) from the silo frame to the camera frame."""
+        T = self.T_silo_camera
+        moved: NDArray[np.float64] = (points - T[:3, 3]) @ T[:3, :3]
+        return moved

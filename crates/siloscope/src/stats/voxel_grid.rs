@@ -26,6 +26,29 @@ pub struct Cloud {
     pub points: Vec<Vec3>,
     /// Number of points behind each mean.
     pub counts: Vec<u32>,
+    /// Numbers of the voxels, ascending.
+    keys: Vec<u64>,
+    /// Voxels a metre.
+    per_metre: f64,
+}
+
+impl Cloud {
+    /// For each point whether a flag of its voxel is set; false where it has no voxel.
+    pub fn of_points(&self, points: &[Vec3], flags: &[bool]) -> Vec<bool> {
+        let voxel = |point| fixed_point(point, self.per_metre).and_then(|(key, _)| self.keys.binary_search(&key).ok());
+        points.iter().map(|point| voxel(point).and_then(|voxel| flags.get(voxel).copied()).unwrap_or(false)).collect()
+    }
+}
+
+/// Number of a point's voxel, and its position in fixed-point form; `None` beyond `REACH`.
+fn fixed_point(point: &Vec3, per_metre: f64) -> Option<(u64, [u64; 3])> {
+    let p = point * per_metre;
+    if !(p.x.abs() < REACH && p.y.abs() < REACH && p.z.abs() < REACH) {
+        return None;
+    }
+    let fixed = [p.x, p.y, p.z].map(|c| (c + SHIFT + TO_FIXED).to_bits());
+    let [i, j, k] = fixed.map(|c| (c >> FRACTION) & ((1 << INDEX_BITS) - 1));
+    Some(((i << (2 * INDEX_BITS)) | (j << INDEX_BITS) | k, fixed))
 }
 
 /// Where points come from, in parts that can be visited side by side.
@@ -98,13 +121,7 @@ impl Grid {
     }
 
     fn add(&mut self, point: &Vec3) {
-        let p = point * self.per_metre;
-        if !(p.x.abs() < REACH && p.y.abs() < REACH && p.z.abs() < REACH) {
-            return;
-        }
-        let [x, y, z] = [p.x, p.y, p.z].map(|c| (c + SHIFT + TO_FIXED).to_bits());
-        let [i, j, k] = [x, y, z].map(|c| (c >> FRACTION) & ((1 << INDEX_BITS) - 1));
-        let key = (i << (2 * INDEX_BITS)) | (j << INDEX_BITS) | k;
+        let Some((key, [x, y, z])) = fixed_point(point, self.per_metre) else { return };
         if key != self.open.0 {
             self.close();
             self.open = (key, Sum::default());
@@ -145,6 +162,8 @@ impl Grid {
         Cloud {
             points: voxels.iter().map(mean).collect(),
             counts: voxels.iter().map(|(_, s)| u32::try_from(s.count).unwrap_or(u32::MAX)).collect(),
+            keys: voxels.iter().map(|(key, _)| *key).collect(),
+            per_metre: self.per_metre,
         }
     }
 }

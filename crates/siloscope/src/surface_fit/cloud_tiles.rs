@@ -1,21 +1,20 @@
 //! Patches of a point cloud: the means of a voxel grid, with normals from their neighbours.
 
+use crate::Result;
 use crate::base::workers::Workers;
 use crate::geometry::normals::normals;
 use crate::stats::neighbours::nearest_neighbours;
-use crate::stats::voxel_grid::voxel_grid;
+use crate::stats::voxel_grid::Cloud;
 use crate::surface_fit::tiles::{NONE, Patch, Patches};
-use crate::{Result, Vec3};
 
 /// Neighbours of a patch for its normal.
 const NEIGHBOURS: usize = 24;
 
-/// Patches of a cloud, one for each occupied voxel of `grid` metres; fewer than `NEIGHBOURS` give none.
+/// Patches of a cloud, one for each occupied voxel; fewer than `NEIGHBOURS` give none.
 ///
 /// The normal is the direction in which the neighbourhood is thinnest. The eight neighbours that stand beside a patch
 /// are the farthest of its neighbourhood, far enough for their normals to tell a turn.
-pub fn cloud_patches(points: &[Vec3], grid: f64, workers: &Workers) -> Result<Patches> {
-    let cloud = voxel_grid(points, grid, workers)?;
+pub fn cloud_patches(cloud: &Cloud, workers: &Workers) -> Result<Patches> {
     let mut patches = Patches { side: 1, cloud: true, ..Patches::default() };
     if cloud.points.len() <= NEIGHBOURS {
         return Ok(patches);

@@ -8,14 +8,13 @@ use crate::surface_fit::tiles::{DOWN, NONE, Patches, RIGHT};
 const CERTAIN: f64 = 3.0;
 /// Where tiles two apart have more than this share of the misfit in common, all of it is the wall's.
 const MOST: f64 = 0.5;
+/// How many tiles apart they are in a cloud.
+const APART_IN_CLOUDS: usize = 4;
 /// And at least this share of it always.
 const LEAST: f64 = 0.25;
 
 /// By how much larger the variance of many tiles together is because neighbours' residuals have something in common.
 pub fn variance_of_neighbours(patches: &Patches, tiles: &[TileEquation]) -> f64 {
-    if patches.cloud {
-        return 1.0;
-    }
     let pulls = OfTiles::new(patches, tiles, |tile| tile.pull() * tile.equation.variance.sqrt());
     let own = tiles.iter().map(|tile| pulls.values[tile.patch].powi(2)).sum::<f64>() / tiles.len().max(1) as f64;
     let along = |direction: usize| {
@@ -33,15 +32,17 @@ pub fn variance_of_neighbours(patches: &Patches, tiles: &[TileEquation]) -> f64 
 ///
 /// All of it where neighbouring pixels' noise is independent, as what is warped over many tiles is mostly evened out into
 /// the fit and leaves less in the residuals than it does; else what tiles two apart have in common, as the rest is noise.
+/// Tiles of a cloud are as small as the caller likes, and may share noise with more of their neighbours.
 pub fn lasting_misfit(patches: &Patches, misfit: f64, tiles: &[TileEquation]) -> f64 {
-    if patches.cloud || patches.common_noise == 1.0 {
+    if patches.common_noise == 1.0 {
         return misfit;
     }
     let across = OfTiles::new(patches, tiles, |tile| {
         let e = &tile.equation;
         e.residual / tile.spread * tukey(e.residual * e.residual / e.variance)
     });
-    let [(right, right_pairs), (down, down_pairs)] = [RIGHT, DOWN].map(|direction| across.product(direction, 2));
+    let apart = if patches.cloud { APART_IN_CLOUDS } else { 2 };
+    let [(right, right_pairs), (down, down_pairs)] = [RIGHT, DOWN].map(|direction| across.product(direction, apart));
     let product = (right * right_pairs + down * down_pairs) / f64::max(right_pairs + down_pairs, 1.0);
     let common = product.max(0.0).sqrt();
     if common > MOST * misfit { misfit } else { common.max(LEAST * misfit) }

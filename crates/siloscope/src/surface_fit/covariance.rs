@@ -58,9 +58,6 @@ const SECTORS: f64 = 48.0;
 const BLOCK: u32 = 8;
 
 fn block(problem: &Problem, patch: usize) -> usize {
-    if problem.patches.cloud {
-        return patch / 16;
-    }
     let (column, row) = problem.patches.list[patch].tile;
     (row / BLOCK) as usize * problem.patches.columns + (column / BLOCK) as usize
 }

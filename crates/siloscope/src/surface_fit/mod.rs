@@ -1,6 +1,7 @@
 //! The surface fit: a depth frame in, the silo's wall as cylinder and cone out, with its covariance.
 
 pub mod bow;
+pub mod cloud_equations;
 pub mod cloud_tiles;
 pub mod common;
 pub mod covariance;
@@ -40,7 +41,9 @@ use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::parameters::{BIAS, Information, OVALITY, PARAMETERS};
 use crate::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
 use crate::geometry::surface::SurfaceTolerance;
+use crate::stats::voxel_grid::voxel_grid;
 use crate::surface_fit::bow::bow_uncertainty;
+use crate::surface_fit::cloud_equations::CloudWall;
 use crate::surface_fit::cloud_tiles::cloud_patches;
 use crate::surface_fit::common::lasting_misfit;
 use crate::surface_fit::covariance::{
@@ -57,7 +60,7 @@ use crate::surface_fit::model_selection::{Settled, coarse_fit, drop_film};
 use crate::surface_fit::outcome::check_determined;
 pub use crate::surface_fit::outcome::{Knowledge, Outcome, SurfaceFit, Vessels};
 use crate::surface_fit::parts::change_without_a_part;
-use crate::surface_fit::polish::{ALL, TileEquation, patch_equations, pixel_equations, polish, solve_equations};
+use crate::surface_fit::polish::{ALL, TileEquation, pixel_equations, polish, solve_equations};
 use crate::surface_fit::solver::{Fit, OVALITY_STD, Prior, Problem, free_parameters, tukey};
 use crate::surface_fit::tiles::{Patch, Patches, noise_from_scatter, tile_patches};
 use crate::surface_fit::warm_start::{KnownWall, confirmed};
@@ -261,7 +264,8 @@ impl SurfaceFit {
 /// wall, weighed by each patch's own scatter, and normals have no sign.
 pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge) -> Result<Outcome> {
     let mut clock = Clock::start();
-    let mut patches = cloud_patches(points, grid, workers)?;
+    let cloud = voxel_grid(points, grid, workers)?;
+    let mut patches = cloud_patches(&cloud, workers)?;
     if patches.list.len() < 30 {
         return Ok(Err(Refusal::NoDepth));
     }
@@ -273,22 +277,37 @@ pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge
         Ok(found) => found,
         Err(refusal) => return Ok(Err(refusal)),
     };
-    let known = KnownWall::of(&found);
-    let Settled { mut fit, wall, evidence, bare } = found;
     clock.lap("coarse fit");
-    let problem = Problem { patches: &patches, noise, prior: &prior, pixel: 0.0 };
-    fit.surface = fit.surface.without(bare);
-    let mut equations = patch_equations(&problem, &fit, &wall);
-    let relief = relief_beside_noise(&equations);
-    let mut result = match finish(&problem, fit, &mut equations, (evidence, known), relief) {
+    let on_wall = cloud.of_points(points, &found.wall);
+    let mut result = match tiled(&CloudWall { points, on_wall: &on_wall, grid }, (noise, &prior), found) {
         Ok(found) => found,
         Err(refusal) => return Ok(Err(refusal)),
     };
     clock.lap("covariance");
     result.timing = clock.laps();
-    result.patches = patches;
     result.fit.inside = result.is_seen_from_inside();
     Ok(Ok(result))
+}
+
+/// The wall that a cloud's voxels have settled on, measured by the points of its surface's tiles.
+fn tiled(cloud: &CloudWall, (noise, prior): (NoiseLaw, &Prior), found: Settled) -> Outcome {
+    let known = KnownWall::of(&found);
+    let Settled { mut fit, evidence, bare, .. } = found;
+    fit.surface = fit.surface.without(bare);
+    let mut rounds = 0;
+    loop {
+        let tiles = cloud.tiles(fit.surface);
+        let problem = Problem { patches: &tiles.patches, noise, prior, pixel: 0.0 };
+        let mut equations = tiles.equations(&problem, &fit);
+        let mut result = finish(&problem, fit.clone(), &mut equations, (evidence, known), 0.0)?;
+        let settled = rounds > 0 && result.fit.surface.is_near(&fit.surface, &LINEAR);
+        if settled || rounds == MOST_ROUNDS {
+            result.patches = tiles.patches;
+            return Ok(result);
+        }
+        fit = result.fit;
+        rounds += 1;
+    }
 }
 
 fn noise(patches: &Patches, know: &Knowledge) -> NoiseLaw {

@@ -4,7 +4,6 @@ use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::parameters::Parameters;
 use crate::geometry::sensor::NoiseLaw;
-use crate::stats::robust::{MEDIAN_OF_CHI_SQUARE, median};
 pub use crate::surface_fit::equation::TileEquation;
 use crate::surface_fit::misfit::{misfit_of, misfit_to_start_from, spread_misfit};
 use crate::surface_fit::residual::{Sampling, tile_residual};
@@ -90,38 +89,6 @@ fn noisier(expected: f64, scatter: f64) -> f64 {
     const SURELY: f64 = 1.5;
     let own = scatter * scatter;
     if own > SURELY * expected { own } else { expected }
-}
-
-/// Equations of a cloud's wall patches from their own means.
-pub fn patch_equations(problem: &Problem, fit: &Fit, wall: &[bool]) -> Vec<TileEquation> {
-    let placed = SurfaceEvaluator::new(fit.surface);
-    let patch = |patch: usize| {
-        let equation = problem.equation(fit, &placed, patch)?;
-        let seen = &problem.patches.list[patch];
-        let noise = seen.scatter * seen.scatter / seen.count;
-        Some(TileEquation {
-            patch,
-            equation: Equation { variance: noise, ..equation },
-            noise,
-            expected: seen.scatter * seen.scatter,
-            scatter: seen.scatter,
-            count: seen.count,
-            spread: 1.0 / equation.cosine,
-        })
-    };
-    let mut equations: Vec<TileEquation> = (0..wall.len()).filter(|&i| wall[i]).filter_map(patch).collect();
-    let factor = noise_factor(&equations);
-    for e in &mut equations {
-        e.noise *= factor;
-        e.equation.variance = e.noise;
-    }
-    equations
-}
-
-/// What the residuals' variance is of the stated one: a neighbourhood's scatter also holds the wall's own curvature.
-fn noise_factor(equations: &[TileEquation]) -> f64 {
-    let squares = equations.iter().map(|e| e.equation.residual.powi(2) / e.equation.variance.max(1e-18));
-    median(squares.collect()).map_or(1.0, |middle| (middle / MEDIAN_OF_CHI_SQUARE).clamp(1e-3, 1.0))
 }
 
 /// A step this small is the last, in squared standard deviations; the next would be a hundredth of it.
