@@ -40,7 +40,8 @@ class Inputs:
 
     def locate(self) -> Estimate:
         """The answer."""
-        return siloscope.locate(self.raw, self.camera, **self.settings)
+        public = {name: value for name, value in self.settings.items() if not name.startswith("_")}
+        return siloscope.locate(self.raw, self.camera, **public)
 
 
 def right(seed: int) -> Inputs:
@@ -105,8 +106,7 @@ def outcome(told: Inputs) -> tuple[str, str]:
 
     "contradicted", "refused" as any frame that does not show enough wall, "warned", or "silent".
     """
-    public = {name: value for name, value in told.settings.items() if not name.startswith("_")}
-    estimate = replace(told, settings=public).locate()
+    estimate = told.locate()
     codes = [remark.code for remark in estimate.quality if remark.severity != "note"]
     if not estimate.ok:
         return ("contradicted" if estimate.reason in INPUT_REMARKS else "refused"), str(estimate.reason)

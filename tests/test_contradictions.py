@@ -13,7 +13,7 @@ import pytest
 from numpy.typing import NDArray
 
 import siloscope
-from siloscope import Camera, UsageError, sensors
+from siloscope import Camera, Frame, UsageError, sensors
 from siloscope.cli import main
 from siloscope.estimation.input_checks import camera_remarks, hole_remarks, range_remarks
 from siloscope.estimation.prior_checks import diameter_off, prior_remarks
@@ -26,10 +26,10 @@ from siloscope.simulation.scenarios import random_scene, scenario
 from siloscope.types.intrinsics import CALIBRATED
 
 sys.path.append(str(Path(__file__).parents[1]))
-from benchmarks.contradictions import WRONG, outcomes
+from benchmarks.contradictions import WRONG, outcomes, right
 
 PROFILE = "realsense-d435"
-CAMERA = Camera(160, 120, 142.6, 142.6, 79.5, 59.5)
+CAMERA = scaled(next(c for c in sensors.load(PROFILE).intrinsics if c.width == 640), (160, 120))
 SCENE = replace(scenario("silo2"), camera=CAMERA, sensor=replace(sensor_model(PROFILE), unit=0.001), seed=4)
 DEPTH = np.nan_to_num(SCENE.render().measured)
 RAW: NDArray[np.uint16] = np.rint(DEPTH / 0.001).astype(np.uint16)
@@ -74,7 +74,8 @@ def test_a_surface_a_little_beyond_the_range_is_a_warning(farthest: float, told:
 
 def test_a_sensor_that_measures_too_far_is_judged_by_the_true_depth() -> None:
     """The paper's Silo 2: 7.2 m away, 8.2 m as its Astra S measures, which reaches 8 m."""
-    seen = replace(scenario("silo2"), feed=None, camera=CAMERA, sensor=sensor_model("orbbec-astra-s")).render()
+    own, _ = before_its_own_camera("orbbec-astra-s", "silo2")
+    seen = replace(scenario("silo2"), feed=None, camera=own, sensor=sensor_model("orbbec-astra-s")).render()
     depth = np.nan_to_num(seen.measured).astype(np.float32)
     assert np.mean(depth > 8.0) > 0.05
     assert range_remarks(depth, sensors.load("orbbec-astra-s")) == ()
@@ -204,6 +205,25 @@ def test_ray_lengths_and_disparities_taken_for_depth_are_named() -> None:
         assert (code, "warning") in codes(estimate), (code, estimate.quality)
         assert estimate.message is not None
         assert REMARKS[code][1] in estimate.message
+
+
+def test_a_reading_by_chance_is_no_hint() -> None:
+    """A cone alone, refused without gravity; bent as by ray lengths, it is a cylinder of which tiles disagree."""
+    told = right(396)
+    estimate = told.locate()
+    assert estimate.reason == "cone-alone"
+    assert codes(estimate) == []
+
+
+def test_a_camera_of_another_sensor_is_warned_of_where_nothing_confirms_it() -> None:
+    longer = replace(CAMERA, fx=1.5 * CAMERA.fx, fy=1.5 * CAMERA.fy)
+    seen = replace(SCENE, camera=longer).render()
+    depth = np.nan_to_num(seen.measured)
+    warning = ("another-streams-camera", "warning")
+    assert warning in codes(siloscope.locate(depth, longer, sensor=PROFILE))
+    assert warning not in codes(siloscope.locate(depth, longer, sensor=PROFILE, diameter=DIAMETER)), "the tape fits"
+    assert warning not in codes(siloscope.locate(Frame(depth=depth, camera=longer), sensor=PROFILE)), "its recording's"
+    assert warning not in codes(siloscope.locate(depth, longer))
 
 
 def test_filled_holes_are_named_and_coarse_values_are_not() -> None:
