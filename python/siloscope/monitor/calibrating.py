@@ -16,6 +16,7 @@ from siloscope.monitor.clock import Clock
 from siloscope.monitor.settings import Limits
 from siloscope.monitor.store import frames, places, readings
 from siloscope.monitor.store.engine import Store
+from siloscope.monitor.store.leader import CALIBRATING, Leadership
 from siloscope.monitor.workers import Lost, Process, camera_of
 
 FEWEST = 8
@@ -38,6 +39,7 @@ class Calibrating:
         self._wake, self._stopping = threading.Event(), threading.Event()
         self._process = Process(limits)
         self._tried: dict[str, int] = {}
+        self._leadership = Leadership(store, CALIBRATING)
         self._thread = threading.Thread(target=self._work, name="calibrating", daemon=True)
 
     def start(self) -> None:
@@ -55,12 +57,13 @@ class Calibrating:
         self._process.stop()
         if self._thread.is_alive():
             self._thread.join(5)
+        self._leadership.release()
 
     def _work(self) -> None:
         while not self._stopping.is_set():
             self._wake.wait(60.0)
             self._wake.clear()
-            if not self._stopping.wait(POLL_S):
+            if not self._stopping.wait(POLL_S) and self._leadership.held():
                 self.look()
 
     def look(self) -> None:

@@ -21,6 +21,9 @@ from siloscope.monitor.workers import CalibrationFiles, Lost, Process, camera_of
 RETRY = 5 * SECOND
 """How long a frame rests that has ended its worker."""
 
+LEASE = 3.0
+"""After so many times the longest measurement, a frame's process is taken for gone."""
+
 POLL_S = 1.0
 """How often the queue is looked at without being told of a frame."""
 
@@ -92,7 +95,8 @@ class Measuring:
 
     def _one(self, process: Process) -> bool:
         """Measures a frame; whether there was one."""
-        row = frames.claim(self._store, self._clock.now())
+        now = self._clock.now()
+        row = frames.claim(self._store, now, now + int(LEASE * self._limits.measure_s * SECOND))
         if row is None:
             return False
         known = self._known(row)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import random
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
 
@@ -109,10 +109,10 @@ def retry(attempts: int) -> int:
 
 
 class Deliverer:
-    """A thread of one channel: a channel that hangs holds up nobody but itself."""
+    """A thread of one channel: a channel that hangs holds up nobody but itself. It delivers while `leads`."""
 
-    def __init__(self, outbox: Outbox, channel: Channel, clock: Clock) -> None:
-        self._outbox, self._channel, self._clock = outbox, channel, clock
+    def __init__(self, outbox: Outbox, channel: Channel, clock: Clock, leads: Callable[[], bool]) -> None:
+        self._outbox, self._channel, self._clock, self._leads = outbox, channel, clock, leads
         self._stopping = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"deliver-{channel.name}", daemon=True)
 
@@ -127,6 +127,8 @@ class Deliverer:
 
     def _run(self) -> None:
         while not self._stopping.wait(LOOK_S):
+            if not self._leads():
+                continue
             try:
                 self._outbox.deliver_on(self._channel, self._clock.now())
             except OperationalError:

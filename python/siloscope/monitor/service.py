@@ -25,8 +25,15 @@ from siloscope.monitor.retention import Keeper
 from siloscope.monitor.settings import Settings
 from siloscope.monitor.store import changes, frames, places, readings
 from siloscope.monitor.store.engine import Store, new_id, opened
+from siloscope.monitor.store.leader import PUBLISHING, Leadership
 from siloscope.monitor.story import Storyteller
 from siloscope.monitor.workers import CalibrationFiles
+
+TOLD = "told_change"
+"""The fact that says up to which change stories and rules are told, where several processes share a database."""
+
+FOLLOWED = 2000
+"""Changes that are looked at in a beat."""
 
 BEAT_S = 1.0
 """How often what readings changed is told anew."""
@@ -61,8 +68,11 @@ class Service:
         settings.data.mkdir(parents=True, exist_ok=True)
         self.settings = settings
         self.clock = clock or SystemClock()
-        self.lock = Lock(settings.data / "lock")
+        self.lock = Lock(settings.data / "lock", shared=not settings.url.startswith("sqlite"))
         self.store: Store = opened(settings.url)
+        self._leadership = Leadership(self.store, PUBLISHING)
+        self.leads = self.store.is_sqlite
+        """Whether this process tells stories, fires alerts and publishes; of several on a database one does."""
         self.blobs = Blobs(settings.data / "frames")
         self.outbox = Outbox(self.store)
         self.intake = Intake(self.store, self.blobs, settings.limits, self.clock)
@@ -88,7 +98,7 @@ class Service:
     def prepare(self) -> Swept:
         """Sweeps, requeues, applies SITE.toml."""
         now = self.clock.now()
-        swept = Swept(self.blobs.sweep(), frames.requeue_interrupted(self.store), self._check_recent(now))
+        swept = self._tidied(now) if self.lock.alone else Swept(0, 0, 0)
         with self.store.write() as connection:
             if places.fact(connection, "box") is None:
                 places.set_fact(connection, "box", new_id())
@@ -97,7 +107,14 @@ class Service:
                 found = site.read(self.settings.site)
                 site.apply(connection, found, self.settings.site, now)
                 self.outlets = found
+        self.lock.share()
         return swept
+
+    def _tidied(self, now: int) -> Swept:
+        """What the first process on the folder does; of others on the database, frames may be in work."""
+        self.files.clear()
+        since = None if self.store.is_sqlite else now
+        return Swept(self.blobs.sweep(), frames.requeue_interrupted(self.store, since), self._check_recent(now))
 
     def _check_recent(self, now: int) -> int:
         """Fails the waiting frames of the last day whose bytes can't be relied on."""
@@ -131,12 +148,14 @@ class Service:
         self.looking.stop()
         for thread in self._threads:
             thread.join(5)
+        self._leadership.release()
         self.store.close()
         self.lock.release()
 
     def changed(self, silo: str, time: int) -> None:
         """Says that a silo's readings changed at a time: its story is told anew from there."""
-        self._remember({silo: time})
+        if self.store.is_sqlite:
+            self._remember({silo: time})
         self.calibrating.wake()
         self.announce()
 
@@ -180,7 +199,9 @@ class Service:
         ticked = kept = 0
         while not self._stopping.wait(BEAT_S):
             now = self.clock.now()
+            self.leads = self._leadership.held()
             try:
+                self._follow()
                 self.beat()
                 if now - kept >= self.settings.retention.every or not self.has_room():
                     kept = now
@@ -188,9 +209,27 @@ class Service:
                 self._tell_of_room(now)
             except OperationalError:
                 continue  # a full disk or a busy database: the next beat tries again
-            if now - ticked >= self.settings.tick:
+            if self.leads and now - ticked >= self.settings.tick:
                 ticked = now
                 self.tick()
+
+    def _follow(self) -> None:
+        """Learns from the log of changes what readings came, whichever process measured them.
+
+        How far it is told is noted in the database, so that whoever takes over goes on there.
+        """
+        if self.store.is_sqlite or not self.leads:
+            return
+        with self.store.read() as connection:
+            cursor = int(places.fact(connection, TOLD) or 0)
+            rows = changes.after(connection, cursor, FOLLOWED)
+            numbers = [int(row.subject) for row in rows if row.kind == "reading" and row.subject.isdecimal()]
+            first = readings.first_times(connection, numbers)
+        self._remember(first)
+        if rows:
+            self.beat()
+            with self.store.write() as connection:
+                places.set_fact(connection, TOLD, int(rows[-1].id))
 
     def beat(self) -> None:
         """Stories and rules of the silos whose readings changed."""
@@ -212,6 +251,8 @@ class Service:
     def tick(self) -> None:
         """Rules of all silos, for what has not come."""
         self.looking.rest()
+        if not self.store.is_sqlite:
+            frames.requeue_interrupted(self.store, self.clock.now())
         with self.store.read() as connection:
             silos = [row.id for row in places.listed(connection, "silo")]
             before = changes.newest(connection)

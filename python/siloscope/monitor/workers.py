@@ -82,7 +82,10 @@ class CalibrationFiles:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
-        for left in folder.glob("*.json"):
+
+    def clear(self) -> None:
+        """Removes them all."""
+        for left in self._folder.glob("*.json"):
             left.unlink()
 
     def of(self, row: Any) -> Path:

@@ -31,6 +31,7 @@ def readyz(service: ServiceOf) -> JSONResponse:
         with service.store.read() as connection:
             waiting = frames.waiting(connection)
         detail: dict[str, str | int | float | bool | None] = {"frames_waiting": waiting, "disk_free_bytes": free}
+        detail["leads"] = service.leads
         ready = service.has_room() and waiting < service.settings.limits.queue
     except SQLAlchemyError as error:
         detail, ready = {"database": type(error).__name__}, False

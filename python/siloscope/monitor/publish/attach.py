@@ -54,7 +54,7 @@ def _link(service: Service, address: str, entry: EdgeEntry | None, site: Path) -
 
 def _deliver(service: Service, channel: Channel) -> None:
     service.outbox.channels[channel.name] = channel
-    service.parts.append(Deliverer(service.outbox, channel, service.clock))
+    service.parts.append(Deliverer(service.outbox, channel, service.clock, lambda: service.leads))
 
 
 def _module(name: str) -> Any:

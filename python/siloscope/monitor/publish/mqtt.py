@@ -41,8 +41,12 @@ ANNOUNCED = "mqtt_topics"
 """The fact that holds which retained topics there are, so that those of a removed silo are emptied in the end."""
 
 
+class _Followed(OSError):
+    """Another process has taken over: the connection ends without a word."""
+
+
 class Mqtt(AsyncPart):
-    """Publishes while it is connected, connects while it runs; a channel for alerts too."""
+    """Publishes while it is connected, connects while its process leads; a channel for alerts too."""
 
     name = MQTT
 
@@ -61,6 +65,8 @@ class Mqtt(AsyncPart):
         """Connects, publishes, and begins again when the link is lost."""
         wait = FIRST_WAIT_S
         while True:
+            while not self._service.leads:
+                await asyncio.sleep(LOOK_S)
             try:
                 async with self._connection() as client:
                     wait = FIRST_WAIT_S
@@ -98,6 +104,8 @@ class Mqtt(AsyncPart):
             await self._put(client, self.topics.box_status, ONLINE)
             self._client = client
             while True:
+                if not self._service.leads:
+                    raise _Followed("another process publishes")
                 await self._tell(client)
                 await asyncio.sleep(LOOK_S)
         except asyncio.CancelledError:

@@ -31,6 +31,9 @@ BUSY_MS = 30_000
 BLOBS = 8480
 """PostgreSQL's advisory lock of the frames' bytes."""
 
+MIGRATING = 8484
+"""PostgreSQL's advisory lock of the schema."""
+
 WRITE = "siloscope_write"
 """Execution option of connections that write."""
 
@@ -74,6 +77,16 @@ class Store:
         if not self.is_sqlite:
             kind = "" if removing else "_shared"
             connection.execute(text(f"SELECT pg_advisory_xact_lock{kind}({BLOBS})"))
+
+    @contextlib.contextmanager
+    def migrating(self) -> Iterator[None]:
+        """One process after the other brings the schema up to date; the second finds it done."""
+        if self.is_sqlite:
+            yield
+            return
+        with self.engine.connect() as connection, connection.begin():
+            connection.execute(text(f"SELECT pg_advisory_xact_lock({MIGRATING})"))
+            yield
 
     def insert_new(self, connection: Connection, table: Table, row: dict[str, Any]) -> bool:
         """Inserts a row unless one with its unique key is there; whether it was inserted."""
@@ -121,7 +134,8 @@ def opened(url: str) -> Store:
     if found != script.get_current_head():
         if found is not None:
             _keep_before(store, found)
-        migrate(store)
+        with store.migrating():
+            migrate(store)
     return store
 
 

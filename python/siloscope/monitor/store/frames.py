@@ -85,8 +85,11 @@ def waiting(connection: Connection) -> int:
     return connection.execute(select(func.count()).select_from(frame).where(states)).scalar_one()
 
 
-def claim(store: Store, now: int) -> Record | None:
-    """Takes the newest waiting frame into measurement; the attempt counts from here, whatever becomes of it."""
+def claim(store: Store, now: int, until: int = 0) -> Record | None:
+    """Takes the newest waiting frame into measurement; the attempt counts from here, whatever becomes of it.
+
+    A process that has not settled it `until` then is taken for gone (`requeue_interrupted`).
+    """
     with store.write() as connection:
         wanted = (
             select(frame.c.id)
@@ -98,7 +101,7 @@ def claim(store: Store, now: int) -> Record | None:
         found = connection.execute(wanted).scalar()
         if found is None:
             return None
-        taken = {"state": MEASURING, "attempts": frame.c.attempts + 1}
+        taken = {"state": MEASURING, "attempts": frame.c.attempts + 1, "not_before": until}
         connection.execute(update(frame).where(frame.c.id == found).values(**taken))
         return get(connection, found)
 
@@ -109,10 +112,11 @@ def settle(connection: Connection, frame_id: str, silo: str, state: str, now: in
     changes.note(connection, "frame", frame_id, silo, now)
 
 
-def requeue_interrupted(store: Store) -> int:
-    """Queues again what was in a worker when the service ended."""
+def requeue_interrupted(store: Store, now: int | None = None) -> int:
+    """Queues again what was in a worker when its service ended: all, or what should have been settled by `now`."""
+    chosen = [frame.c.state == MEASURING, *([] if now is None else [frame.c.not_before < now])]
     with store.write() as connection:
-        back = update(frame).where(frame.c.state == MEASURING).values(state=QUEUED)
+        back = update(frame).where(*chosen).values(state=QUEUED, not_before=0)
         return connection.execute(back).rowcount
 
 

@@ -188,6 +188,14 @@ def newest(connection: Connection, silo: str, count: int) -> Sequence[Record]:
     return connection.execute(wanted).all()
 
 
+def first_times(connection: Connection, numbers: Sequence[int]) -> dict[str, int]:
+    """The earliest time of some readings, by silo."""
+    wanted = select(reading.c.silo, func.min(reading.c.time)).where(
+        reading.c.id.in_(numbers), reading.c.clock != SUSPECT
+    )
+    return {str(silo): int(time) for silo, time in connection.execute(wanted.group_by(reading.c.silo))}
+
+
 def recent(connection: Connection, silo: str, since: int, until: int) -> Sequence[Record]:
     """Answered readings of a stretch, both ends included: time, fill, volume, its own deviation."""
     names = ("time", "fill", "volume", "own_std")
