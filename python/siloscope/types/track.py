@@ -189,7 +189,8 @@ class Track(ByValue):
         table = pandas.DataFrame([reading.to_dict() for reading in self.readings])
         if not self.readings or any(utc(reading.time) is None for reading in self.readings):
             return table
-        return table.set_index(pandas.to_datetime(table.pop("time_utc"), utc=True))
+        times = pandas.to_datetime([reading.time for reading in self.readings], unit="s", utc=True)
+        return table.drop(columns="time_utc").set_index(times.rename("time_utc"))
 
     @property
     def counts(self) -> dict[str, int]:
