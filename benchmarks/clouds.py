@@ -4,9 +4,9 @@ python -m benchmarks.clouds --write
 
 The frames are of every kind of `benchmarks.kinds` in turn, written as the clouds that their camera's software makes
 with what it is told of the camera. An organised cloud keeps its pixels. An unorganised one is turned about the
-optical axis and drawn at random, so that its rays are no camera's. A survey's cloud has true points with 3 mm of noise from several
-places, its origin in none of them. "Ratio" is the deviation of the pose by 40,000 points over that by 100,000 of the
-same cloud; with few points, by 1,500 over 3,000.
+optical axis and drawn at random, so that its rays are no camera's. A survey's cloud has true points with 3 mm of
+noise, its origin in no sensor's place. "Ratio" is the deviation of the pose by 40,000 points over that by 100,000 of
+the same cloud; with few points, by 1,500 over 3,000.
 """
 
 from __future__ import annotations

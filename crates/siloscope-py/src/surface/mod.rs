@@ -9,11 +9,14 @@ use crate::convert::value_error;
 use crate::inputs::{DepthFrame, Priors};
 use crate::outcome::Refusal;
 use fit::{Coverage, SurfaceFit, WallDiagnostics};
-use numpy::PyReadonlyArray2;
+use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 use siloscope::Vec3;
 use siloscope::base::workers::Workers;
-use siloscope::surface_fit::{fit_cloud, fit_image};
+use siloscope::geometry::parameters::PARAMETERS;
+use siloscope::geometry::sensor::DepthBias;
+use siloscope::geometry::surface::SiloSurface;
+use siloscope::surface_fit::{fit_cloud, fit_image, orthogonal};
 use warm_start::WarmStart;
 
 /// A fit, or why there is none.
@@ -67,12 +70,27 @@ fn fit_points(
     Ok(Outcome::of(found, false))
 }
 
+/// Wall (12,) whose squared distances from points (N, 3), m, have the least sum, from the wall `start` (12,) on.
+#[pyfunction]
+fn orthogonal_fit<'py>(
+    py: Python<'py>,
+    points: PyReadonlyArray2<'py, f64>,
+    start: [f64; PARAMETERS],
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let points: Vec<Vec3> = arrays::points(&points)?.into_iter().map(Vec3::from).collect();
+    let start = SiloSurface::of_parameters(&start.into());
+    let found = py.detach(|| orthogonal::orthogonal_fit(&points, start));
+    let found = found.ok_or_else(|| value_error("the points do not fix the wall"))?;
+    Ok(PyArray1::from_slice(py, found.parameters(&DepthBias::default()).as_slice()))
+}
+
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<SurfaceFit>()?;
     m.add_class::<WallDiagnostics>()?;
     m.add_class::<Coverage>()?;
     m.add_class::<WarmStart>()?;
     tiles::register(m)?;
+    m.add_function(wrap_pyfunction!(orthogonal_fit, m)?)?;
     m.add_function(wrap_pyfunction!(fit_depth, m)?)?;
     m.add_function(wrap_pyfunction!(fit_points, m)?)
 }

@@ -15,6 +15,7 @@ pub mod likelihood;
 mod misfit;
 pub mod model_selection;
 pub mod normal_equations;
+pub mod orthogonal;
 pub mod outcome;
 pub mod outermost;
 pub mod parts;
