@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,6 +20,9 @@ NEWEST = 12
 
 MOVED = 3
 """Readings in a row that say that the camera moved before anybody believes it."""
+
+REFILL = 6.0
+"""A rise between two readings beyond so many deviations of one is a refill: by noise alone one in some 100,000."""
 
 CODES = {
     "dirty-lens": frozenset(("lens-film", "too-little-seen", "sensor-buried")),
@@ -105,17 +109,17 @@ def _deviation(seen: Seen) -> float | None:
 
 
 def _fallen(day: Sequence[Any]) -> float:
-    """What was taken out, m³: falls beyond noise, rises left out."""
-    taken, high = 0.0, None
-    for reading in day:
-        if reading.volume is None:
-            continue
-        noise = 3.0 * (reading.own_std or 0.0)
-        if high is None or reading.volume > high:
-            high = reading.volume
-        elif high - reading.volume > noise:
-            taken, high = taken + high - reading.volume, reading.volume
-    return taken
+    """What was taken out, m³: the volume's changes, with rises beyond noise, which are refills, left out.
+
+    Smaller rises count against the falls around them: were they left out too, noise alone would add up to a use.
+    """
+    known = [reading for reading in day if reading.volume is not None]
+    taken = 0.0
+    for before, after in itertools.pairwise(known):
+        noise = REFILL * max(before.own_std or 0.0, after.own_std or 0.0)
+        if after.volume - before.volume <= noise:
+            taken += before.volume - after.volume
+    return float(taken)
 
 
 def _flat_hours(seen: Seen) -> float | None:
