@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import threading
 from collections.abc import Iterator
@@ -14,6 +15,7 @@ import pytest
 
 from fleet.outputs import answers
 from siloscope import InputError
+from siloscope.cli import main
 from siloscope.fleet import plan
 from siloscope.fleet.naming import Series
 from siloscope.fleet.object_store import ObjectStore
@@ -118,6 +120,39 @@ def test_a_run_in_an_object_store_gives_the_same_bytes(
     assert published["results"].startswith("s3://mill/whole/run/results/run=")
     assert publish(Opened.of(f"{s3}/whole/run"))["previous"] is None
     assert remote.version(CURRENT) is not None
+
+
+def test_every_command_of_the_fleet_takes_urls(
+    s3: str, archives: list[Path], calibrations: Path, tmp_path: Path, capsys: Any
+) -> None:
+    store, place = f"{s3}/commands/store", f"{s3}/commands/run"
+
+    def told(*words: str) -> Any:
+        capsys.readouterr()
+        assert main([*words, "--json"]) == 0
+        return json.loads(capsys.readouterr().out)
+
+    assert told("pack", str(archives[3]), "-o", store, "--shard-frames", "8")["frames"] == 20
+    run_id = told("fleet", "plan", store, "--out", place, "--calibrations", str(calibrations))["run"]
+    metrics = tmp_path / "fleet.prom"
+    done = told("fleet", "worker", place, "--index", "0", "--of", "1", "--metrics", str(metrics))
+    assert (done["complete"], done["place"], done["store"]) == (True, place, store)
+    assert told("fleet", "run", place)["complete"]
+    assert told("fleet", "status", f"{place}@{run_id}")["frames"]["done"] == 20
+    assert told("fleet", "diff", place, f"{place}@{run_id}")["all"]["same"] == 20
+    assert told("fleet", "publish", place, "--to", f"{s3}/commands/readings")["run"] == run_id
+    assert open_store(f"{s3}/commands/readings").size(CURRENT)
+
+
+@pytest.mark.parametrize("command", ["info", "calibrate", "track", "measure", "locate"])
+def test_other_commands_say_what_a_store_of_objects_is_for(
+    command: str, calibrations: Path, tmp_path: Path, capsys: Any
+) -> None:
+    known = ["--calibration", str(calibrations / "silo03.json")]
+    words = {"calibrate": ["-o", str(tmp_path / "c.json")], "measure": known, "track": known}.get(command, [])
+    assert main([command, "s3://mill/frames", *words]) == 3
+    told = capsys.readouterr().err
+    assert "s3://mill/frames: frames in an object store are read by `siloscope fleet`" in " ".join(told.split())
 
 
 class Gate:

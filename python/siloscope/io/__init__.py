@@ -165,12 +165,23 @@ def _head(path: Path) -> bytes:
     except InputError:
         raise
     except FileNotFoundError:
+        if url := _url_of(path):
+            raise InputError(
+                f"{url}: frames in an object store are read by `siloscope fleet` and written by `siloscope pack`; for "
+                "this command copy the store, or a silo's folder of it, to a disk and name that"
+            ) from None
         raise InputError(f"{path}: no such file; give the path of a frame that exists") from None
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: can't be read ({error}); check the path and its permissions") from None
     if not head:
         raise InputError(f"{path}: the file is empty; export the frame again")
     return head
+
+
+def _url_of(path: Path) -> str | None:
+    """The URL that was given as a path, which has lost a slash; None for a path."""
+    scheme, colon, rest = str(path).partition(":/")
+    return f"{scheme}://{rest.lstrip('/')}" if colon and scheme.isalnum() and len(scheme) > 1 else None
 
 
 def _cameras(camera: Camera | StrPath | None) -> tuple[tuple[Known, ...], float | None]:
