@@ -32,8 +32,8 @@ SENSOR = sensors.load("orbbec-astra-s")
 WITHIN = 0.3
 """Fraction by which what is foreseen may differ from the scatter."""
 OBLIQUITY, OVAL, BEND, RINGS = 0.005, 0.002, 2e-4, 1e-4
-"""Tolerances of every vessel (docs/design/fit-model.md): of its outlet's place, per length of the hopper; of its ovality,
-as a fraction of the radius; of bend and rings, m."""
+"""Tolerances of every vessel (docs/design/fit-model.md): of its outlet's place, per length of the hopper; of its
+ovality, as a fraction of the radius; of bend and rings, m."""
 FEWEST = 10
 """Answers from which on a scatter is told."""
 
@@ -152,7 +152,7 @@ def main() -> None:
         "places",
         "tilt",
         "place",
-        "axis at the lowest point",
+        "axis at the bottom",
     )
     trials.publish("plan", trials.table(head, lines), options.write, "benchmarks.plan", PAGE)
 
