@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from siloscope.types.surface_map import SurfaceMap
     from siloscope.types.track import Track
     from siloscope.types.vessel import SiloGeometry
+    from siloscope.validation.mapping import sensor_map
     from siloscope.validation.validate import Validation, validate
 
 __all__ = [
@@ -53,6 +54,7 @@ __all__ = [
     "locate",
     "measure",
     "open",
+    "sensor_map",
     "surface_map",
     "tare",
     "track",
@@ -78,6 +80,7 @@ _HOMES = {
     "types.surface_map": ("SurfaceMap",),
     "types.track": ("Track",),
     "types.vessel": ("SiloGeometry",),
+    "validation.mapping": ("sensor_map",),
     "validation.validate": ("Validation", "validate"),
     **{verb: (verb,) for verb in _VERBS},
 }

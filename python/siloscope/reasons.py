@@ -24,6 +24,8 @@ CALIBRATION_REMARKS = {
     "scale-unknown": "the depth scale is not known; a measured diameter would make every length surer",
     "cone-not-seen": "no frame shows the cone; the apex and the cylinder's bottom are unknown",
     "cylinder-not-seen": "no frame shows the cylinder; radius and cylinder's bottom are unknown",
+    "sensor-mapped": "a map of the sensor's error, which foretells held-out frames, corrects the depth",
+    "sensor-not-mapped": "no map of the sensor's error was kept: none foretells held-out frames",
     "deformed": "the wall departs from a cylinder by more than walls do; look for a deposit, or another shape",
 }
 """Remarks on a calibration: stable code and what it means."""

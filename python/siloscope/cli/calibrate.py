@@ -21,6 +21,7 @@ from siloscope.estimation.vessel_checks import vessel_remarks
 from siloscope.io import FrameSource
 from siloscope.reasons import calibration_remark
 from siloscope.types.calibration import Calibration
+from siloscope.validation.mapping import Mapping, with_map
 from siloscope.vessel.vessel import Vessel
 
 
@@ -49,6 +50,9 @@ def calibrate(
     earlier: Annotated[
         Path | None, typer.Option("--continue", metavar="FILE", help="An earlier calibration to go on with.")
     ] = None,
+    sensor_map: Annotated[
+        bool, typer.Option("--sensor-map", help="Map what the sensor reads wrong over its image, if that lasts.")
+    ] = False,
     rule: Annotated[str, typer.Option(help="information, or mean-of-last-10, the paper's.")] = "information",
     jobs: Annotated[
         int | None, typer.Option(min=1, max=256, help="Frames at the same time; all cores unless given.")
@@ -65,7 +69,9 @@ def calibrate(
 
     Frames count by what they show; bad ones are left out and named. Where the camera has moved, only the frames since
     are fused. --empty marks frames of the empty vessel: their floor is then known as it is, whatever its shape; with
-    --continue and no FRAMES they only add the floor.
+    --continue and no FRAMES they only add the floor. --sensor-map looks for an error of the sensor that is smooth over
+    the image and lasts; it is kept only if it foretells held-out frames, and then corrects the depth wherever this
+    calibration is used (measure --calibration FILE, locate --sensor FILE).
 
     Exit code 4: no frame shows enough wall; 5: some frames can't be read, the rest is written.
     """
@@ -76,11 +82,12 @@ def calibrate(
     if not paths and not empty:
         raise UsageError("nothing to calibrate from; give FRAMES, or --empty FRAME")
     reading: dict[str, Any] = {"camera": camera, "depth_unit": depth_unit, "stream": stream, "axes": axes, "up": up}
+    learned = _mapping(paths, reading, about, sensor, intrinsics) if sensor_map else None
     if paths:
         with opened(paths, **reading) as source:
             found = siloscope.calibrate(
                 source,
-                sensor=sensor,
+                sensor=sensor if learned is None else learned.profile,
                 diameter=None if about is None else about.sheet.diameter,
                 gravity=down,
                 bottom=None if about is None else _bottom(about),
@@ -93,6 +100,7 @@ def calibrate(
             )
     else:
         found = Calibration.load(earlier or "")
+    found = found if learned is None else with_map(found, learned)
     found = _with_floor(found, empty, files if learn else None, reading, {"sensor": sensor, "vessel": about})
     contradicted = [] if about is None else list(vessel_remarks(found, about))
     for remark in contradicted:
@@ -111,6 +119,21 @@ def calibrate(
     if not found.ok:
         return REFUSED
     return PARTIAL if found.counts["unreadable"] else 0
+
+
+def _mapping(
+    files: list[Path], reading: dict[str, Any], about: Vessel | None, sensor: str | None, intrinsics: str | None
+) -> Mapping:
+    """What the frames say of the sensor's error over its image."""
+    with opened(files, **reading) as source:
+        learned = siloscope.sensor_map(
+            track(source, "mapping the sensor", _count(source)),
+            sensor=sensor,
+            diameter=None if about is None else about.sheet.diameter,
+            intrinsics=intrinsics,
+        )
+    say(f"sensor {'mapped' if learned.map is not None else 'not mapped'}: {learned.message}")
+    return learned
 
 
 def _bottom(vessel: Vessel) -> str | None:

@@ -87,7 +87,7 @@ def know(
     if pose is None:
         raise InputError(f"the calibration has no answer ({calibration.reason}); calibrate with frames that show wall")
     own = sensors.from_record(calibration.config.get("sensor"))
-    profile = sensor or own or sensors.UNKNOWN
+    profile = sensors.with_map(sensor or own or sensors.UNKNOWN, calibration.config.get("sensor"))
     if sensor is not None and own is not None and sensor.bias != own.bias:
         raise UsageError(
             f"the calibration was made with the depth bias of '{own.name}', not of '{sensor.name}'; leave the sensor "

@@ -56,7 +56,8 @@ class SiloContent:
         `since` is the moment on ``time.perf_counter`` from which its preparation counts; now where not given.
         """
         start = time.perf_counter() if since is None else since
-        profile, alone = self.profile or sensors.UNKNOWN, self.located is not None
+        alone = self.located is not None
+        profile = sensors.with_map(self.profile or sensors.UNKNOWN, self.silo.config.get("sensor"))
         prepared = prepare(data, camera_of(data, camera, self.silo), profile,
                            depth_unit=depth_unit, mask=mask, clouds="pixels")  # fmt: skip
         if self.located is not None:

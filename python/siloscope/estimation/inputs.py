@@ -152,6 +152,8 @@ def _prepare_depth(
         )
     if chosen.distortion_model != "none" and not np.isfinite(chosen.rays()).all():
         raise InputError(f"{frame.source}: the camera's distortion can't be undone; check its coefficients")
+    if profile.map is not None:
+        depth = profile.map.corrected(depth)
     kept = _mask(mask, depth.shape, frame.source)
     if kept is not None:
         depth = np.where(kept, depth, np.float32(0))

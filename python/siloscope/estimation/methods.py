@@ -25,7 +25,8 @@ def priors_of(frame: Prepared, settings: Settings) -> Priors:
     """What is known before the frame."""
     if isinstance(frame, PreparedPoints):
         return Priors(CLOUD, settings.diameter, settings.gravity)
-    priors = Priors(settings.profile, settings.diameter, settings.gravity)
+    profile = settings.profile if frame.turn is None else replace(settings.profile, map=None)  # no image, no map
+    priors = Priors(profile, settings.diameter, settings.gravity)
     if settings.vessels != "any":
         return priors
     return replace(priors, any_vessel=True, camera_std=settings.intrinsics_std(frame).of_rays(frame.camera))

@@ -98,6 +98,8 @@ def _estimate(
     values = dict(zip(PARAMETERS, (v if np.isfinite(v) else None for v in fit.parameters.tolist()), strict=True))
     pose = SiloPose(*(float(v) for v in fit.parameters[:4]))
     covariance = fit.covariance if more is None else fit.covariance + more
+    if priors.profile.map is not None:
+        covariance = priors.profile.map.widened(covariance)
     slope, intercept = values["cone_slope"], values["cone_intercept"]
     cone = None if slope is None or intercept is None else (slope, intercept)
     silo, silo_std = geometry_of(values["radius"], cone, covariance)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from siloscope import _core
+from siloscope import _core, sensors
 from siloscope.errors import UsageError
 from siloscope.fusion.history import MAX_KEPT_FACTORS, Fused, History, since_the_last_move
 from siloscope.parameters import PARAMETERS
@@ -59,7 +59,10 @@ def calibration_of(history: History, rule: str, config: dict[str, Any]) -> Calib
 
 def _answer(history: History, fused: Fused, config: dict[str, Any]) -> Calibration:
     fusion = fused.fusion
-    values, covariance = fusion.parameters, fusion.covariance
+    values, covariance, relative = fusion.parameters, fusion.covariance, fusion.covariance_relative
+    profile = sensors.from_record(config.get("sensor"))
+    if profile is not None and profile.map is not None:
+        covariance, relative = profile.map.widened(covariance), profile.map.widened(relative)
     radius, slope, intercept = (None if not np.isfinite(v) else float(v) for v in values[4:7])
     cone = None if slope is None or intercept is None or not fusion.hopper else (slope, intercept)
     silo, silo_std = geometry_of(radius, cone, covariance)
@@ -79,7 +82,7 @@ def _answer(history: History, fused: Fused, config: dict[str, Any]) -> Calibrati
         config=config,
         evidence=fused.kept,
         models=tuple(fusion.models),
-        covariance_relative=fusion.covariance_relative[:4, :4].copy(),
+        covariance_relative=relative[:4, :4].copy(),
     )
 
 

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, Field, ValidationError, model_validator
 from siloscope.parameters import BIAS, NOISE, noise_std
 from siloscope.schema import files
 from siloscope.schema.fields import NotNegative, Number, finite, named
+from siloscope.schema.sensor_map import SensorMapDocument
 from siloscope.schema.validation import Document, StrictDocument, validated, wrong
 
 LARGEST_FILE = 100_000
@@ -129,6 +130,7 @@ class SensorRecord(Document):
     bias: Annotated[tuple[float, float, float], named(BIAS)]
     bias_std: Annotated[tuple[float, float, float], named(BIAS)]
     noise: Annotated[tuple[float, float, float, float, float, float], named(NOISE)] | None
+    map: SensorMapDocument | None = None
 
 
 def record(table: Any) -> SensorRecord | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
@@ -16,6 +16,7 @@ from siloscope.errors import InputError, UsageError
 from siloscope.parameters import BIAS, NOISE, noise_std
 from siloscope.types.camera import Camera
 from siloscope.types.intrinsics import IntrinsicsStd, named
+from siloscope.types.sensor_map import SensorMap
 
 __all__ = ["UNKNOWN", "SensorProfile", "load", "names"]
 
@@ -46,6 +47,8 @@ class SensorProfile:
     intrinsics_std: tuple[float, float, float] | None = None
     """Standard deviations of a device about them: of f (relative), of c (fraction of the width), of k1; None where the
     library's for nominal cameras hold."""
+    map: SensorMap | None = None
+    """What this very device reads wrong over its image; None where nobody has mapped it."""
 
     def camera(self, width: int, height: int) -> Camera | None:
         """Nominal intrinsics for an image size, or None."""
@@ -72,7 +75,8 @@ class SensorProfile:
         """What a result's ``config`` says about the sensor."""
         noise = None if self.noise is None else dict(zip(NOISE, self.noise, strict=True))
         bias, bias_std = (dict(zip(BIAS, values, strict=True)) for values in (self.bias, self.bias_std))
-        return {"name": self.name, "bias": bias, "bias_std": bias_std, "noise": noise}
+        mapped = {} if self.map is None else {"map": self.map.to_dict()}
+        return {"name": self.name, "bias": bias, "bias_std": bias_std, "noise": noise, **mapped}
 
 
 UNKNOWN = SensorProfile(
@@ -98,7 +102,9 @@ def _names() -> tuple[str, ...]:
 
 
 def load(sensor: str | Path | SensorProfile | None) -> SensorProfile:
-    """The profile of a name, of a TOML file, or `UNKNOWN` for None.
+    """The profile of a name, of a TOML file, of a calibration's file, or `UNKNOWN` for None.
+
+    A calibration's is the one that it was made with, and has the map of its device.
 
     Raises
     ------
@@ -112,12 +118,23 @@ def load(sensor: str | Path | SensorProfile | None) -> SensorProfile:
     if str(sensor) in names():
         return _shipped(str(sensor))
     path = Path(sensor)
+    if path.suffix == ".json" and path.is_file():
+        return _of_calibration(path)
     if path.is_file():
         from siloscope.schema.sensor_profile import read
 
         return _parse(read(path), str(path))
     known = ", ".join(names())
     raise UsageError(f"unknown sensor '{sensor}'; give a TOML profile's path or one of: {known}")
+
+
+def _of_calibration(path: Path) -> SensorProfile:
+    from siloscope.schema.calibration import read
+
+    found = from_record(read(path)[1].get("sensor"))
+    if found is None:
+        raise InputError(f"{path}: the calibration does not tell its sensor; name the sensor itself")
+    return found
 
 
 def from_record(table: Any) -> SensorProfile | None:
@@ -130,7 +147,18 @@ def from_record(table: Any) -> SensorProfile | None:
     told = record(table)
     if told is None:
         return None
-    return SensorProfile(told.name, told.bias, told.bias_std, told.noise, _ranges().get(told.name, (0.0, math.inf)))
+    reach = _ranges().get(told.name, (0.0, math.inf))
+    mapped = None if told.map is None else SensorMap(told.map.power, told.map.error, told.map.std, told.map.opens)
+    return SensorProfile(told.name, told.bias, told.bias_std, told.noise, reach, map=mapped)
+
+
+def with_map(profile: SensorProfile, table: Any) -> SensorProfile:
+    """A profile with the map of the sensor in a calibration's ``config``, where that is the same one and was mapped."""
+    if profile.map is not None or not isinstance(table, dict) or "map" not in table:
+        return profile
+    own = from_record(table)
+    same = own is not None and profile.name in (own.name, UNKNOWN.name)
+    return replace(profile, map=own.map) if own is not None and same else profile
 
 
 @cache
