@@ -8,11 +8,11 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
-import zstandard
 from numpy.typing import NDArray
 
 import recording_files
 from frame_files import CAMERA, CLOUD, METRES, POINTS, RAW
+from siloscope.io.zstandard import zstd
 
 
 def pgm(raw: NDArray[np.uint16] = RAW, comment: bytes = b"# a depth image\n") -> bytes:
@@ -181,7 +181,7 @@ MAKERS: dict[str, Callable[[], bytes]] = {
     "polar.lvx": polar_lvx,
     "old.lvx": lambda: lvx_1_0(58),
     "scan.lvx2": lvx2,
-    "bag.mcap.zstd": lambda: zstandard.compress(recording_files.ros2(mcap=True)),
-    "bag.db3.zst": lambda: zstandard.compress(recording_files.ros2(mcap=False)),
+    "bag.mcap.zstd": lambda: zstd.compress(recording_files.ros2(mcap=True)),
+    "bag.db3.zst": lambda: zstd.compress(recording_files.ros2(mcap=False)),
 }
 """Good files by name."""

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import zstandard
 from PIL import Image
 
 import more_files as made
@@ -18,6 +17,7 @@ from frame_files import CAMERA, CLOUD, METRES, POINTS, RAW, put, read
 from siloscope import Camera, InputError
 from siloscope.cli import main
 from siloscope.io import camera_files
+from siloscope.io.zstandard import zstd
 
 
 def refusal(path: Path) -> str:
@@ -226,12 +226,12 @@ def test_a_ros_2_bag_packed_whole(tmp_path: Path, mcap: bool, capsys: pytest.Cap
 def test_bad_packed_files_are_refused_by_their_own_name(tmp_path: Path) -> None:
     recording = made.MAKERS["bag.mcap.zstd"]()
     assert "damaged Zstandard file" in refusal(put(tmp_path, recording[:4] + b"\xff" * 40, "bad.mcap.zstd"))
-    assert "holds no recording; unpack it: zstd -d" in refusal(put(tmp_path, zstandard.compress(b"text"), "a.zst"))
-    bomb = zstandard.compress(recording_files.ros2(mcap=True) + bytes(80 << 20))
+    assert "holds no recording; unpack it: zstd -d" in refusal(put(tmp_path, zstd.compress(b"text"), "a.zst"))
+    bomb = zstd.compress(recording_files.ros2(mcap=True) + bytes(80 << 20))
     assert len(bomb) < 40_000
     assert "unpacks to more than" in refusal(put(tmp_path, bomb, "bomb.zst"))
     whole = recording_files.ros2(mcap=True)
-    cut = zstandard.compress(whole[: len(whole) // 2])
+    cut = zstd.compress(whole[: len(whole) // 2])
     with siloscope.open(put(tmp_path, cut, "cut.mcap.zst")) as source:
         list(source)
         assert "cut.mcap.zst: the recording is cut off" in source.problems[-1]

@@ -94,10 +94,10 @@ def wire(encoding: str, data: Buffer) -> Wire:
 
 def _unpacked(data: bytes) -> bytes:
     """A message that the recorder compressed by itself (``--compression-mode message``)."""
-    import zstandard
+    from siloscope.io import zstandard
 
-    size = zstandard.frame_content_size(data)
-    if size < 0:
+    size = zstandard.content_size(data)
+    if size is None:
         raise InputError("a compressed message does not tell its size")
     return decompress("zstd", data, size)
 
@@ -140,7 +140,9 @@ def _steps(compression: str, data: bytes) -> Iterator[bytes]:
 
         return _pulled(lz4.frame.LZ4FrameDecompressor(), data)
     if compression == "zstd":
-        return _zstd_steps(data)
+        from siloscope.io import zstandard
+
+        return zstandard.steps(data, _STEP)
     raise InputError(f"messages are compressed with '{compression}'; read are lz4, bz2 and zstd")
 
 
@@ -151,17 +153,6 @@ def _pulled(decompressor: Any, data: bytes) -> Iterator[bytes]:
         if decompressor.eof or decompressor.needs_input:
             return
         part = decompressor.decompress(b"", _STEP)
-
-
-def _zstd_steps(data: bytes) -> Iterator[bytes]:
-    import zstandard
-
-    try:
-        with zstandard.ZstdDecompressor(max_window_size=1 << 27).stream_reader(data, read_across_frames=True) as reader:
-            while part := reader.read(_STEP):
-                yield part
-    except zstandard.ZstdError as error:
-        raise ValueError(error) from None
 
 
 def or_none(read: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T | None:

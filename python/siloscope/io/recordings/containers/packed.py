@@ -82,22 +82,22 @@ def _opened(path: Path, plain: Path) -> tuple[str, Recording]:
 
 
 def _unpack(path: Path, plain: Path) -> None:
-    import zstandard
+    from siloscope.io import zstandard
 
     most = path.stat().st_size * _MOST_RATIO + _ROOM
     free = shutil.disk_usage(plain.parent).free - _ROOM
     have = 0
-    decompressor = zstandard.ZstdDecompressor(max_window_size=1 << 27)
     try:
-        with path.open("rb") as packed, plain.open("wb") as file:
-            reader = decompressor.stream_reader(packed, read_across_frames=True)
-            while part := reader.read(_STEP):
+        with plain.open("wb") as file:
+            for part in zstandard.steps(path, _STEP):
                 have += len(part)
                 if have > min(most, free):
                     why = "which depth does not" if have > most else "more than the disk has room for"
                     raise InputError(f"{path}: unpacks to more than {have >> 20} MB, {why}; check the file")
                 file.write(part)
-    except zstandard.ZstdError as error:
+    except EOFError:
+        return  # what there is of it is read as of any recording whose end is missing
+    except zstandard.DamagedError as error:
         raise InputError(f"{path}: damaged Zstandard file ({error}); copy it again") from None
 
 
