@@ -10,13 +10,18 @@ import pytest
 
 import realdata
 import siloscope
-from siloscope import Estimate, Frame, SiloPose
+from siloscope import Estimate, Frame, SiloPose, _core
 from siloscope.estimation import shape_tensor, steps
+from siloscope.sensors import SensorProfile
 from siloscope.simulation import ASTRA_S, Feed, Scene, SensorModel, metrics
 from siloscope.simulation.scenarios import random_scene, scenario
+from siloscope.types.depth_frame import DepthFrame
 
 NOISE = SensorModel(noise=ASTRA_S.noise, unit=0.001)
 """The Astra S without its bias, in millimetres."""
+
+EXACT = {"sensor": SensorProfile("exact"), "intrinsics": "exact"}
+"""Told of a sensor and a camera without errors."""
 
 
 def locate(scene: Scene, **given: Any) -> tuple[Estimate, Any]:
@@ -48,7 +53,7 @@ def test_silos_nobody_has_seen_are_adjusted_to_millimetres(seed: int) -> None:
 
 
 def test_the_silo_is_measured_as_far_as_it_is_seen() -> None:
-    estimate, seen = locate(scenario("silo2"))
+    estimate, seen = locate(scenario("silo2"), **EXACT)
     truth = seen.scene.silo.geometry
     for name in ("radius", "cylinder_bottom", "apex"):
         assert getattr(estimate.silo, name) == pytest.approx(getattr(truth, name), abs=2e-3)
@@ -78,7 +83,7 @@ def test_the_covariance_tells_the_errors_size() -> None:
     normalised = []
     for seed in range(60, 72):
         base = random_scene(seed, Feed("gaussian", 0.1 + 0.03 * (seed % 5)), sensor=NOISE)
-        estimate, seen = locate(base)
+        estimate, seen = locate(base, **EXACT)
         if estimate.pose is None or estimate.covariance is None:
             continue
         error = metrics.transform_error(estimate.pose, seen.pose)
@@ -89,6 +94,33 @@ def test_the_covariance_tells_the_errors_size() -> None:
     assert len(z) >= 9
     assert 0.4 < np.sqrt((z**2).mean()) < 2.0
     assert np.abs(z).max() < 6.0
+
+
+@pytest.mark.parametrize("sensor", ["orbbec-astra-s", None])
+def test_a_depth_error_that_the_steps_leave_in_is_in_the_deviations(sensor: str | None) -> None:
+    """Of frames with the Astra's depth error, told or not: by the scatter alone half of them are beyond 4."""
+    off, plain = [], []
+    for seed in range(60, 70):
+        scene = random_scene(seed, Feed("gaussian", 0.1 + 0.03 * (seed % 5)), sensor=ASTRA_S)
+        estimate, seen = locate(scene, sensor=sensor)
+        if estimate.pose is None or estimate.covariance is None:
+            continue
+        error = metrics.transform_error(estimate.pose, seen.pose)
+        pose = np.array([error.r_x, error.r_y, error.t_x, error.t_y]) / np.sqrt(np.diag(estimate.covariance))
+        found, std, truth = (vars(one) for one in (estimate.silo, estimate.silo_std, scene.silo.geometry))
+        lengths = [(found[name] - truth[name]) / std[name] for name in found if found[name] is not None]
+        off += [*pose, *lengths]
+        depth = DepthFrame.of(seen.measured.astype(np.float32), scene.camera)
+        by_scatter = _core.shape_tensor_depth(depth, shape_tensor.Settings(grid=steps.GRID), None)
+        assert isinstance(by_scatter, _core.ShapeTensorFit)
+        assert by_scatter.pose == pytest.approx([getattr(estimate, name) for name in ("r_x", "r_y", "t_x", "t_y")])
+        plain.append(np.abs(pose * np.sqrt(np.diag(estimate.covariance) / np.diag(by_scatter.covariance))).max())
+    z = np.abs(off)
+    assert len(plain) >= 8
+    assert z.max() < 3.0
+    assert (z < 2.0).mean() >= 0.95
+    assert np.sqrt((z**2).mean()) > 0.4
+    assert np.median(plain) > 3.0
 
 
 @pytest.mark.parametrize("world", ["flat-wall", "room-corner", "square-shaft", "sphere", "noise", "brim-full"])

@@ -6,6 +6,7 @@ use numpy::{Element, PyReadonlyArray2, PyReadonlyArray3, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use siloscope::geometry::depth_image::{Depth, DepthImage};
 use siloscope::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
+use siloscope::shape_tensor::instrument::SensorErrors;
 use siloscope::surface_fit::{Knowledge, Vessels};
 use siloscope::{Camera, Vec3};
 use std::borrow::Cow;
@@ -41,6 +42,12 @@ pub struct Priors {
 }
 
 impl Priors {
+    /// As the six steps take them.
+    pub fn sensor_errors(self) -> SensorErrors {
+        let SensorProfile { bias, bias_std, .. } = self.profile;
+        SensorErrors { bias: depth_bias(bias), bias_std, camera_std: self.camera_std }
+    }
+
     /// As the surface fit takes them.
     pub fn knowledge(self) -> Knowledge {
         let SensorProfile { bias, bias_std, noise } = self.profile;

@@ -2,7 +2,7 @@
 
 use crate::arrays::{self, in_c_order};
 use crate::convert::value_error;
-use crate::inputs::{DepthArray, DepthFrame, FrameBuffers};
+use crate::inputs::{DepthArray, DepthFrame, FrameBuffers, Priors};
 use crate::outcome::Refusal;
 use crate::shape_tensor_fit::{Length, ShapeTensorFit, StepsDiagnostics};
 use numpy::{
@@ -17,6 +17,7 @@ use siloscope::geometry::view::View;
 use siloscope::shape_tensor;
 use siloscope::shape_tensor::axis::{self, Wall};
 use siloscope::shape_tensor::candidates::{self, Candidate};
+use siloscope::shape_tensor::instrument::SensorErrors;
 use siloscope::shape_tensor::tensors::ShapeTensor;
 use siloscope::stats::neighbours::Neighbours;
 use siloscope::stats::{neighbours, voxel_grid as grid};
@@ -293,16 +294,22 @@ struct Settings {
 }
 
 impl Settings {
-    fn of_core(self) -> PyResult<shape_tensor::Settings> {
+    fn of_core(self, errors: SensorErrors) -> PyResult<shape_tensor::Settings> {
         let Self { grid, neighbours, view, share, agreement, partners, threads } = self;
-        Ok(shape_tensor::Settings { grid, neighbours, view: self::view(&view)?, share, agreement, partners, threads })
+        let view = self::view(&view)?;
+        Ok(shape_tensor::Settings { grid, neighbours, view, share, agreement, partners, threads, errors })
     }
 }
 
-/// Runs the six steps on a depth image.
+/// Runs the six steps on a depth image of a sensor whose errors are known by its priors.
 #[pyfunction]
-fn shape_tensor_depth(py: Python<'_>, frame: DepthFrame<'_>, settings: Settings) -> PyResult<Outcome> {
-    let settings = settings.of_core()?;
+fn shape_tensor_depth(
+    py: Python<'_>,
+    frame: DepthFrame<'_>,
+    settings: Settings,
+    priors: Option<Priors>,
+) -> PyResult<Outcome> {
+    let settings = settings.of_core(priors.map_or_else(SensorErrors::default, |priors| priors.sensor_errors()))?;
     match &frame.depth {
         DepthArray::Single(depth) => located(py, &frame.buffers(depth)?, &settings),
         DepthArray::Double(depth) => located(py, &frame.buffers(depth)?, &settings),
@@ -322,7 +329,7 @@ fn located<T: Depth>(
 /// Runs the six steps on points (N, 3), metres, seen from the origin; rows that aren't finite are left out.
 #[pyfunction]
 fn shape_tensor_points(py: Python<'_>, points: Doubles, settings: Settings) -> PyResult<Outcome> {
-    let (points, settings) = (vectors(&points)?, settings.of_core()?);
+    let (points, settings) = (vectors(&points)?, settings.of_core(SensorErrors::default())?);
     py.detach(|| shape_tensor::locate_in_points(&points, &settings)).map(Outcome::from).map_err(value_error)
 }
 

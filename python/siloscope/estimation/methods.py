@@ -71,7 +71,7 @@ def _shape_tensor(frame: Prepared, settings: Settings, config: dict[str, Any]) -
     chosen = shape_tensor.Settings(grid=settings.grid, neighbours=settings.neighbours, threads=settings.threads)
     if isinstance(frame, PreparedPoints):
         return shape_tensor.fit_points(frame.points, chosen, config)
-    return shape_tensor.fit_depth(frame.depth, frame.camera, chosen, config)
+    return shape_tensor.fit_depth(frame.depth, frame.camera, chosen, config, priors_of(frame, settings))
 
 
 METHODS: dict[str, Callable[[Prepared, Settings, dict[str, Any]], Estimate]] = {

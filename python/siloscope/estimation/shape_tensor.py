@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from siloscope import _core
 from siloscope.estimation import steps
+from siloscope.estimation.priors import Priors
 from siloscope.estimation.steps import cell_size
 from siloscope.types.camera import Camera
 from siloscope.types.depth_frame import DepthFrame
@@ -36,7 +37,11 @@ class Settings:
 
 
 def fit_depth(
-    depth: NDArray[np.float32], camera: Camera, settings: Settings, config: dict[str, Any] | None = None
+    depth: NDArray[np.float32],
+    camera: Camera,
+    settings: Settings,
+    config: dict[str, Any] | None = None,
+    priors: Priors | None = None,
 ) -> Estimate:
     """Run the six steps on a depth image.
 
@@ -50,9 +55,12 @@ def fit_depth(
         Choices for the steps.
     config : dict, optional
         Effective settings to record in the estimate beside these.
+    priors : Priors, optional
+        What is known of the sensor and of the intrinsics. The steps leave these errors in the answer; its covariance
+        has them. None for that of the scatter alone.
     """
     settings = replace(settings, grid=settings.grid or steps.GRID)
-    found = _core.shape_tensor_depth(DepthFrame.of(depth, camera), settings)
+    found = _core.shape_tensor_depth(DepthFrame.of(depth, camera), settings, priors)
     return _estimate(found, {**(config or {}), **asdict(settings)}, pixels=True)
 
 

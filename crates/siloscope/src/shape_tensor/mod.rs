@@ -5,6 +5,7 @@ pub mod candidates;
 pub mod covariance;
 pub mod coverage;
 pub mod diagnostics;
+pub mod instrument;
 pub mod profile;
 pub mod tensors;
 
@@ -19,6 +20,7 @@ use crate::shape_tensor::candidates::{Candidate, select_candidates};
 use crate::shape_tensor::covariance::Scatter;
 use crate::shape_tensor::coverage::{Coverage, coverage};
 use crate::shape_tensor::diagnostics::{Evidence, PlacedWall, placed_walls};
+use crate::shape_tensor::instrument::SensorErrors;
 use crate::shape_tensor::profile::{Profile, fit_profile};
 use crate::shape_tensor::tensors::{ShapeTensor, shape_tensors};
 use crate::stats::blocks::blocks;
@@ -44,11 +46,21 @@ pub struct Settings {
     pub partners: usize,
     /// Threads; the answer does not depend on them.
     pub threads: usize,
+    /// What is known of the sensor's errors: they stay in the answer, and are in its covariance.
+    pub errors: SensorErrors,
+}
+
+impl Settings {
+    /// Side of the blocks whose errors are independent, metres.
+    fn block(&self) -> f64 {
+        BLOCK * self.grid * (self.neighbours as f64).sqrt()
+    }
 }
 
 impl Default for Settings {
     fn default() -> Self {
-        Self { grid: 0.05, neighbours: 30, view: None, share: 0.7, agreement: 2.0, partners: 100, threads: 1 }
+        let errors = SensorErrors::default();
+        Self { grid: 0.05, neighbours: 30, view: None, share: 0.7, agreement: 2.0, partners: 100, threads: 1, errors }
     }
 }
 
@@ -89,9 +101,9 @@ pub fn locate_in_points(points: &[Vec3], settings: &Settings) -> Result<Outcome>
 }
 
 /// What steps 1 and 2 make of a frame.
-struct Surface {
+struct Surface<'a> {
     cloud: Cloud,
-    near: Neighbours,
+    near: &'a Neighbours,
     normals: Vec<Vec3>,
     tensors: Vec<ShapeTensor>,
 }
@@ -113,10 +125,10 @@ fn locate_in_grid(
     clock.lap("normals");
     let tensors = shape_tensors(points, &near, &normals, workers); // step 2, Goldfeather and Interrante
     clock.lap("shape tensors");
-    let surface = Surface { near, normals, tensors, cloud };
+    let surface = Surface { near: &near, normals, tensors, cloud };
     let chosen = settings.view.map(|view| [view]);
     let views = chosen.as_ref().map_or(views, |view| view);
-    let mut outcomes = views.iter().map(|view| axis_seen_from(*view, &surface, settings, workers, &mut clock));
+    let mut outcomes = views.iter().map(|view| located_from(*view, &surface, settings, workers, &mut clock));
     // Where no view gives an axis, the first one's reason is the one to tell.
     let first = outcomes.next().unwrap_or(Err(Refusal::NoWall));
     let outcome = first.or_else(|refusal| outcomes.find_map(Outcome::ok).ok_or(refusal));
@@ -124,8 +136,24 @@ fn locate_in_grid(
     Ok(outcome.map(|located| Located { timing: clock.laps(), ..located }))
 }
 
+/// The axis, and how sure it is.
+fn located_from(view: View, surface: &Surface, settings: &Settings, workers: &Workers, clock: &mut Clock) -> Outcome {
+    let found = axis_of(view, surface, settings, workers, clock);
+    let located = assess(surface, &found?, settings, workers);
+    clock.lap("evidence");
+    let located = instrument::with_errors(located?, (surface, view), settings, workers);
+    clock.lap("sensor");
+    located
+}
+
 /// Steps 3 to 6.
-fn axis_seen_from(view: View, surface: &Surface, settings: &Settings, workers: &Workers, clock: &mut Clock) -> Outcome {
+fn axis_of(
+    view: View,
+    surface: &Surface,
+    settings: &Settings,
+    workers: &Workers,
+    clock: &mut Clock,
+) -> std::result::Result<Found, Refusal> {
     let Surface { cloud, near, normals, tensors } = surface;
     let points = &cloud.points;
     let candidates = select_candidates(points, near, tensors, settings.share, view, workers); // step 3
@@ -139,9 +167,7 @@ fn axis_seen_from(view: View, surface: &Surface, settings: &Settings, workers: &
     let a = axis_point(&estimates, workers).ok_or(Refusal::NoWall)?;
     clock.lap("point");
     let pose = SiloPose { t_x: -a.x, t_y: -a.y, ..SiloPose::from_axis(&x, &Vec3::zeros()) }; // step 6, Eqs. 6, 7
-    let outcome = assess(surface, &Found { pose, view, candidates, consensus, estimates }, settings, workers);
-    clock.lap("evidence");
-    outcome
+    Ok(Found { pose, view, candidates, consensus, estimates })
 }
 
 /// What the six steps found.
@@ -156,7 +182,7 @@ struct Found {
 /// What the paper leaves out: how sure the answer is, whether to give it, and what the frame shows.
 fn assess(surface: &Surface, found: &Found, settings: &Settings, workers: &Workers) -> Outcome {
     let walls = placed_walls(&found.consensus.kept, &surface.cloud.points, &surface.normals, &found.pose);
-    let side = BLOCK * settings.grid * (settings.neighbours as f64).sqrt();
+    let side = settings.block();
     let (seen, covariance) =
         workers.join(|| shown(surface, &found.pose, side, settings.grid), || covariance(found, &walls, side));
     let (profile, coverage) = seen?;

@@ -122,6 +122,17 @@ fn cone_through(p: &Place, q: &Place) -> Option<Cone> {
 }
 
 impl Profile {
+    /// Adds the step from one profile to another to the covariances, of the parts that both have.
+    pub fn add_step(&mut self, from: &Self, to: &Self) {
+        if let (Some(from), Some(to)) = (from.radius, to.radius) {
+            self.radius_std = self.radius_std.hypot(to - from);
+        }
+        if let (Some(from), Some(to)) = (from.cone, to.cone) {
+            let step = Vector2::new(to.slope - from.slope, to.apex - from.apex);
+            self.cone_covariance += step * step.transpose();
+        }
+    }
+
     /// z where the cylinder meets the cone; None where either is missing.
     pub fn bottom(&self) -> Option<f64> {
         Some(self.cone?.apex - self.radius? / self.cone?.slope)
