@@ -12,25 +12,27 @@ from typing import Any
 from siloscope.cli import main
 from siloscope.monitor.store import engine, frames
 from siloscope.monitor.store.engine import new_id
+from siloscope.monitor.store.recording import Recorder
 
 
 def acknowledge_first() -> None:
     """Frames are recorded a moment after they were acknowledged."""
-    record, promised = frames.record, threading.local()
+    promised = threading.local()
     frames.__dict__["new_id"] = lambda: promised.id
 
-    def later(store: Any, arrival: Any, there: Callable[[], bool], *, archived: bool = False) -> tuple[str, bool]:
-        key = new_id()
+    def later(self: Any, arrival: Any, there: Callable[[], bool], *, archived: bool = False) -> tuple[str, bool]:
+        key, store = new_id(), self._store
 
         def work() -> None:
             time.sleep(0.2)
             promised.id = key
-            record(store, arrival, there, archived=archived)
+            with store.write() as connection:
+                frames.record(store, connection, arrival, there, archived=archived)
 
         threading.Thread(target=work, daemon=True).start()
         return key, True
 
-    frames.__dict__["record"] = later
+    setattr(Recorder, "record", later)  # noqa: B010
 
 
 def no_flush() -> None:

@@ -21,6 +21,7 @@ from siloscope.monitor.publish.attach import attach
 from siloscope.monitor.service import Service
 from siloscope.monitor.settings import Settings
 from siloscope.monitor.store import frames, people, places, readings
+from siloscope.monitor.store.recording import Recorder
 
 NOON = 1_798_718_400 * SECOND
 """2026-12-31 12:00 UTC, µs; the first reading is a second later."""
@@ -145,7 +146,7 @@ def measured(service: Farm, time: int, *, silo: str = "silo7", status: str = "ok
         part.add(content)
         service.blobs.keep(part)
     arrival = frames.Arrival(f"cam{silo[-1]}", part.sha256, time, time, "good", "png", len(content))
-    frame, _ = frames.record(service.store, arrival, lambda: True)
+    frame, _ = Recorder(service.store).record(arrival, lambda: True)
     with service.store.write() as connection:
         frames.settle(connection, frame, silo, frames.MEASURED, time)
     return reading(service, silo, time=time, frame=frame, status=status, **more)

@@ -9,13 +9,15 @@ import tempfile
 import threading
 import time
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
 import pytest
 from alembic.autogenerate import compare_metadata
 from alembic.runtime.migration import MigrationContext
-from sqlalchemy import text
+from sqlalchemy import event, text
+from sqlalchemy.exc import IntegrityError
 
 from monitor import farm
 from monitor.servers import eventually, write_site
@@ -30,6 +32,7 @@ from siloscope.monitor.settings import Limits, Retention, Settings
 from siloscope.monitor.store import aging, alerts, frames, people, places, readings, schema_people, transfer
 from siloscope.monitor.store.engine import Store, new_id, opened, whole
 from siloscope.monitor.store.filesystem import kind_of, refuse_network
+from siloscope.monitor.store.recording import Recorder
 from siloscope.monitor.store.schema import metadata
 
 NOW = 1_800_000_000 * SECOND
@@ -95,7 +98,7 @@ def filled(store: Store, folder: Path) -> None:
 
 def arrived(store: Store, sha: str, captured: int, state: str = frames.MEASURED) -> str:
     found = frames.Arrival("cam7", sha, captured, captured, "good", "png", 3)
-    key, new = frames.record(store, found, lambda: True)
+    key, new = Recorder(store).record(found, lambda: True)
     assert new
     with store.write() as connection:
         frames.settle(connection, key, "silo7", state, NOW)
@@ -118,9 +121,40 @@ def test_a_frame_is_claimed_once_newest_first_and_counts_its_attempts(store: Sto
     assert frames.requeue_interrupted(store) == 2
     assert frames.claim(store, NOW).attempts == 2
     arrival = frames.Arrival("cam7", "a" * 64, NOW, NOW, "good", "png", 3)
-    assert frames.record(store, arrival, lambda: True) == (old, False)
+    assert Recorder(store).record(arrival, lambda: True) == (old, False)
     with pytest.raises(frames.BytesGone):
-        frames.record(store, frames.Arrival("cam7", "c" * 64, NOW, NOW, "good", "png", 3), lambda: False)
+        Recorder(store).record(frames.Arrival("cam7", "c" * 64, NOW, NOW, "good", "png", 3), lambda: False)
+
+
+def test_frames_that_arrive_together_share_commits_and_none_is_told_before(store: Store, tmp_path: Path) -> None:
+    """60 frames of 12 senders at a time; one whose bytes are gone fails alone, one of an unknown camera too."""
+    filled(store, tmp_path / "site")
+    commits = 0
+
+    def counted(_connection: Any) -> None:
+        nonlocal commits
+        commits += 1
+
+    event.listen(store.engine, "commit", counted)
+    recorder, before = Recorder(store), commits
+
+    def sent(k: int) -> str:
+        camera = "nobody" if k == 30 else "cam7"
+        arrival = frames.Arrival(camera, f"{k:064x}", NOW + k, NOW, "good", "png", 3)
+        try:
+            key, new = recorder.record(arrival, lambda: k != 40)
+        except (frames.BytesGone, IntegrityError) as error:
+            return type(error).__name__
+        with store.read() as connection:
+            assert frames.get(connection, key).sha256 == arrival.sha256
+        return "new" if new else "known"
+
+    with ThreadPoolExecutor(12) as pool:
+        found = list(pool.map(sent, range(60)))
+    assert found == ["IntegrityError" if k == 30 else "BytesGone" if k == 40 else "new" for k in range(60)]
+    assert commits - before < 59 + 58  # a read's end is a commit too
+    with store.read() as connection:
+        assert frames.waiting(connection) == 58
 
 
 def test_a_new_run_keeps_the_old_reading(store: Store, tmp_path: Path) -> None:
@@ -381,7 +415,7 @@ def test_bytes_that_two_cameras_sent_stay_while_one_frame_needs_them(store: Stor
     kept(store, blobs, b"same", day + HOUR)
     sha256 = max(blobs.hashes(), key=lambda one: blobs.path(one).read_bytes() == b"same")
     other = frames.Arrival("cam8", sha256, NOW, NOW, "good", "png", 4)
-    frames.record(store, other, lambda: True)
+    Recorder(store).record(other, lambda: True)
     assert keeper(store, blobs).keep().by_age == 1
     assert blobs.intact(sha256)
 
@@ -392,7 +426,7 @@ def test_a_frame_whose_bytes_were_lost_is_taken_again(store: Store, tmp_path: Pa
     with store.write() as connection:
         frames.settle(connection, key, "silo7", frames.FAILED, NOW, kept=False)
     again = frames.Arrival("cam7", "a" * 64, NOW, NOW, "good", "png", 3)
-    assert frames.record(store, again, lambda: True) == (key, True)
+    assert Recorder(store).record(again, lambda: True) == (key, True)
     assert frames.claim(store, NOW).id == key
 
 

@@ -13,6 +13,7 @@ from monitor.servers import Server, ago, frame_bytes, serving, write_site
 from siloscope.monitor.clock import DAY, HOUR, MINUTE, SECOND, SUSPECT, capture
 from siloscope.monitor.publish.image import images
 from siloscope.monitor.store import alerts, frames, readings
+from siloscope.monitor.store.recording import Recorder
 from siloscope.monitor.story import Storyteller
 
 
@@ -50,7 +51,7 @@ def test_a_camera_with_a_clock_of_the_future_still_falls_silent(tmp_path: Path) 
     service = farm.make(tmp_path)
     farm.measured(service, service.clock.now())
     arrival = frames.Arrival("cam7", "f" * 64, service.clock.now() + 900 * DAY, service.clock.now(), SUSPECT, "png", 3)
-    frames.record(service.store, arrival, lambda: True)
+    Recorder(service.store).record(arrival, lambda: True)
     service.clock.time += farm.LATE
     with service.store.read() as connection:
         assert images(connection, service.clock.now())[0].status == "silent"

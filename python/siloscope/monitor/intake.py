@@ -8,10 +8,12 @@ from __future__ import annotations
 
 import errno
 import sqlite3
-from collections.abc import AsyncIterable
+import time
+from collections.abc import AsyncIterable, Callable
 from dataclasses import dataclass
 
 from anyio import to_thread
+from sqlalchemy import Connection
 from sqlalchemy.exc import OperationalError
 
 from siloscope.monitor.blobs import Blobs, Part
@@ -21,9 +23,16 @@ from siloscope.monitor.problems import Problem
 from siloscope.monitor.settings import Limits
 from siloscope.monitor.store import frames
 from siloscope.monitor.store.engine import Store
+from siloscope.monitor.store.recording import Recorder
 
 RETRY_S = 30
 """What a sender is asked to wait where too much waits already."""
+
+COUNTED_S = 0.5
+"""So long a count of the queue holds."""
+
+Check = Callable[[Connection], None]
+"""Raises `Problem` for who may not send."""
 
 FULL = (errno.ENOSPC, errno.EDQUOT)
 
@@ -55,11 +64,12 @@ class Intake:
 
     def __init__(self, store: Store, blobs: Blobs, limits: Limits, clock: Clock) -> None:
         self._store, self._blobs, self._limits, self._clock = store, blobs, limits, clock
+        self._recorder = Recorder(store)
+        self._counted, self._waiting = float("-inf"), 0
 
-    async def take(self, told: Told, body: AsyncIterable[bytes]) -> Taken:
-        """Receives a body; raises `Problem` where it can't be kept."""
-        self._check_length(told.length or 0)
-        known = await to_thread.run_sync(self._room, told)
+    async def take(self, told: Told, body: AsyncIterable[bytes], check: Check | None = None) -> Taken:
+        """Receives a body; raises `Problem` where it can't be kept, or where the `check` does."""
+        known = await to_thread.run_sync(self._room, told, check)
         if known is not None:
             return known
         try:
@@ -95,19 +105,29 @@ class Intake:
         if length > self._limits.body:
             raise Problem("too-large", f"the body has more than {self._limits.body} bytes; send one frame a request")
 
-    def _room(self, told: Told) -> Taken | None:
+    def _room(self, told: Told, check: Check | None) -> Taken | None:
         """The frame, where it was taken before; raises `Problem` where there is no room for another."""
         with self._store.read() as connection:
+            if check is not None:
+                check(connection)
+            self._check_length(told.length or 0)
             known = frames.find(connection, told.camera, told.sha256) if told.sha256 else None
             if known is not None and not frames.lost(known) and (known.kept or not told.archived):
                 return Taken(known.id, False)
-            if frames.waiting(connection) >= self._limits.queue:
+            if self._in_queue(connection) >= self._limits.queue:
                 detail = f"{self._limits.queue} frames wait to be measured; keep the frame and send it later"
                 raise Problem("too-many", detail, {"Retry-After": str(RETRY_S)})
         free, total = self._blobs.free()
         if free < min(self._limits.reserve, int(self._limits.reserve_fraction * total)):
             raise full(self._blobs)
         return None
+
+    def _in_queue(self, connection: Connection) -> int:
+        """Frames that wait, counted a moment ago: counting a long queue takes longer than taking a frame."""
+        now = time.monotonic()
+        if now - self._counted > COUNTED_S:
+            self._counted, self._waiting = now, frames.waiting(connection)
+        return self._waiting
 
     def _keep(self, told: Told, part: Part) -> Taken:
         sha256 = part.sha256
@@ -121,7 +141,7 @@ class Intake:
         arrival = frames.Arrival(told.camera, sha256, taken.time, received, taken.clock, part.format, part.size)
         place = self._blobs.path(sha256)
         try:
-            return Taken(*frames.record(self._store, arrival, place.exists, archived=told.archived))
+            return Taken(*self._recorder.record(arrival, place.exists, archived=told.archived))
         except frames.BytesGone:
             detail = "the bytes were removed with an older frame of the same content; send it again"
             raise Problem("unavailable", detail, {"Retry-After": "1"}) from None

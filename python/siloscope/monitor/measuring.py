@@ -8,6 +8,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from sqlalchemy.exc import OperationalError
+
 from siloscope import _core
 from siloscope.monitor import worker
 from siloscope.monitor.blobs import Blobs
@@ -79,13 +81,24 @@ class Measuring:
             thread.join(5)
 
     def _work(self) -> None:
-        process = Process(self._limits)
+        process, row = Process(self._limits), None
         try:
             while not self._stop.is_set():
-                if not self._one(process):
+                try:
+                    row = row or frames.claim(self._store, *self._lease())
+                    following = None if row is None else self._one(process, row)
+                except OperationalError:  # a full disk or a busy database: the frame comes back after its lease
+                    row = following = None
+                if row is None:
                     self._rest(process)
+                row = following
         finally:
             process.stop()
+
+    def _lease(self) -> tuple[int, int]:
+        """Now, and until when a frame that is claimed now belongs to this process."""
+        now = self._clock.now()
+        return now, now + int(LEASE * self._limits.measure_s * SECOND)
 
     def _rest(self, process: Process) -> None:
         if process.running and time.monotonic() - process.used > self._idle_s:
@@ -93,36 +106,27 @@ class Measuring:
         with self._wake:
             self._wake.wait(POLL_S)
 
-    def _one(self, process: Process) -> bool:
-        """Measures a frame; whether there was one."""
-        now = self._clock.now()
-        row = frames.claim(self._store, now, now + int(LEASE * self._limits.measure_s * SECOND))
-        if row is None:
-            return False
+    def _one(self, process: Process, row: Record) -> Record | None:
+        """Measures a frame; the next one, which is claimed in the transaction that settles it."""
         known = self._known(row)
         if known is None:
-            self._settle(row, frames.GATHERING)
-            return True
+            return self._settle(row, frames.GATHERING)
         try:
             found = process.answer(known.job, self._limits.measure_s)
         except Lost as lost:
-            self._after_loss(row, str(lost))
-            return True
+            return self._after_loss(row, str(lost))
         if self._stop.is_set():
-            return False
+            return None
         if isinstance(found, worker.Unusable):
-            self._settle(row, frames.FAILED, error=found.message)
-        else:
-            self._keep(row, known, found)
-        return True
+            return self._settle(row, frames.FAILED, error=found.message)
+        return self._keep(row, known, found)
 
-    def _after_loss(self, row: Record, reason: str) -> None:
+    def _after_loss(self, row: Record, reason: str) -> Record | None:
         if self._stop.is_set():
-            return
+            return None
         if row.attempts >= self._limits.attempts:
-            self._settle(row, frames.FAILED, error=f"{reason}; tried {row.attempts} times")
-        else:
-            self._settle(row, frames.QUEUED, error=reason, not_before=self._clock.now() + RETRY)
+            return self._settle(row, frames.FAILED, error=f"{reason}; tried {row.attempts} times")
+        return self._settle(row, frames.QUEUED, error=reason, not_before=self._clock.now() + RETRY)
 
     def _known(self, row: Record) -> Known | None:
         """What the frame is measured with; None where its camera has no calibration yet."""
@@ -141,12 +145,14 @@ class Measuring:
         job = worker.MeasureJob(self._blobs.path(row.sha256), camera_of(camera), file, dict(silo.vessel), content)
         return Known(job, calibration.id, config)
 
-    def _settle(self, row: Record, state: str, **more: Any) -> None:
+    def _settle(self, row: Record, state: str, **more: Any) -> Record | None:
         with self._store.write() as connection:
             frames.settle(connection, row.id, row.silo, state, self._clock.now(), **more)
+            following = frames.claimed(connection, *self._lease())
         self._told(row.silo, row.captured)
+        return following
 
-    def _keep(self, row: Record, known: Known, found: worker.Measured) -> None:
+    def _keep(self, row: Record, known: Known, found: worker.Measured) -> Record | None:
         now = self._clock.now()
         with self._store.write() as connection:
             origin = "measured" if row.run is None else "recomputed"
@@ -163,6 +169,8 @@ class Measuring:
             }
             readings.add(connection, values, found.surface, now)
             frames.settle(connection, row.id, row.silo, frames.MEASURED, now, error=None)
+            following = frames.claimed(connection, *self._lease())
         self.seconds += found.seconds
         self.count += 1
         self._told(row.silo, row.captured)
+        return following

@@ -251,8 +251,7 @@ class Service:
     def tick(self) -> None:
         """Rules of all silos, for what has not come."""
         self.looking.rest()
-        if not self.store.is_sqlite:
-            frames.requeue_interrupted(self.store, self.clock.now())
+        frames.requeue_interrupted(self.store, self.clock.now())
         with self.store.read() as connection:
             silos = [row.id for row in places.listed(connection, "silo")]
             before = changes.newest(connection)

@@ -6,11 +6,12 @@ import asyncio
 import re
 from collections.abc import AsyncIterator
 from contextlib import suppress
+from functools import partial
 from typing import Annotated
 
-from anyio import to_thread
 from fastapi import APIRouter, Header, Path, Query, Request, Response
 from fastapi.responses import FileResponse
+from sqlalchemy import Connection
 from starlette.requests import ClientDisconnect
 
 from siloscope.monitor import access
@@ -78,9 +79,8 @@ async def post_frame(
     service = service_of(request)
     body = request.stream()
     try:
-        await to_thread.run_sync(_allowed, request, service, camera)
         told = Told(camera, *_told(content_sha256, captured_at, captured_age), _length(request))
-        taken = await service.intake.take(told, body)
+        taken = await service.intake.take(told, body, partial(_allowed, request, service, camera))
     except Problem:
         await _read_out(request, body)
         raise
@@ -105,19 +105,19 @@ async def _read_out(request: Request, body: AsyncIterator[bytes]) -> None:
                     return
 
 
-def _allowed(request: Request, service: Service, camera: str) -> None:
-    with service.store.read() as connection:
-        person = person_of(request, service, connection)
-        if person.kind == "local":
-            raise unauthorized("send the camera's token as 'Authorization: Bearer …'")
-        if person.camera is not None and person.camera != camera:
-            raise Problem("forbidden", f"the token is for another camera than '{camera}'")
-        known = places.get(connection, "camera", camera)
-        if known is not None and person.camera is None:
-            silo = places.get(connection, "silo", known.silo)
-            need("admin", person, access.around(connection, silo))
-        elif person.camera is None and person.highest is None:
-            raise Problem("forbidden", "this needs a token of the camera")
+def _allowed(request: Request, service: Service, camera: str, connection: Connection) -> None:
+    """Raises `Problem` for who may not send a camera's frames."""
+    person = person_of(request, service, connection)
+    if person.kind == "local":
+        raise unauthorized("send the camera's token as 'Authorization: Bearer …'")
+    if person.camera is not None and person.camera != camera:
+        raise Problem("forbidden", f"the token is for another camera than '{camera}'")
+    known = places.get(connection, "camera", camera)
+    if known is not None and person.camera is None:
+        silo = places.get(connection, "silo", known.silo)
+        need("admin", person, access.around(connection, silo))
+    elif person.camera is None and person.highest is None:
+        raise Problem("forbidden", "this needs a token of the camera")
     if known is None:
         raise Problem("not-found", f"there is no camera '{camera}'; add it to SITE.toml")
 

@@ -8,6 +8,7 @@ import sqlite3
 import threading
 import time
 from collections.abc import Iterator
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -90,10 +91,7 @@ class Store:
 
     def insert_new(self, connection: Connection, table: Table, row: dict[str, Any]) -> bool:
         """Inserts a row unless one with its unique key is there; whether it was inserted."""
-        dialect: Any = sqlite if self.is_sqlite else postgresql
-        key = next(iter(table.primary_key.columns))
-        made = dialect.insert(table).values(**row).on_conflict_do_nothing().returning(key)
-        return connection.execute(made).scalar() is not None
+        return connection.execute(_insert_new(table, self.is_sqlite), row).scalar() is not None
 
     def vacuum_into(self, path: Path) -> None:
         """Writes an SQLite database as it is at this moment to a new file."""
@@ -103,6 +101,12 @@ class Store:
     def close(self) -> None:
         """Closes all connections."""
         self.engine.dispose()
+
+
+@lru_cache
+def _insert_new(table: Table, is_sqlite: bool) -> Any:
+    dialect: Any = sqlite if is_sqlite else postgresql
+    return dialect.insert(table).on_conflict_do_nothing().returning(next(iter(table.primary_key.columns)))
 
 
 def opened(url: str) -> Store:

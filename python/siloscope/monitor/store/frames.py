@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, func, insert, select, update
+from sqlalchemy import Connection, bindparam, func, insert, select, update
 
 from siloscope.monitor.clock import SUSPECT
 from siloscope.monitor.store import changes
@@ -17,6 +17,10 @@ from siloscope.monitor.store.schema import camera, frame, reading
 QUEUED, MEASURING, MEASURED, GATHERING, FAILED = "queued", "measuring", "measured", "gathering", "failed"
 STATES = (QUEUED, MEASURING, MEASURED, GATHERING, FAILED)
 """A frame waits, is in a worker, has a reading (or a refusal), waits for a calibration, or can't be used."""
+
+
+FOUND = select(frame).where(frame.c.camera == bindparam("of"), frame.c.sha256 == bindparam("hash"))
+"""Made once: making a statement takes longer than it takes SQLite to answer it."""
 
 
 class BytesGone(Exception):
@@ -38,8 +42,7 @@ class Arrival:
 
 def find(connection: Connection, camera_id: str, sha256: str) -> Record | None:
     """The frame of a camera with these bytes."""
-    wanted = select(frame).where(frame.c.camera == camera_id, frame.c.sha256 == sha256)
-    return connection.execute(wanted).one_or_none()
+    return connection.execute(FOUND, {"of": camera_id, "hash": sha256}).one_or_none()
 
 
 def get(connection: Connection, frame_id: str) -> Record | None:
@@ -48,30 +51,30 @@ def get(connection: Connection, frame_id: str) -> Record | None:
     return connection.execute(wanted).one_or_none()
 
 
-def record(store: Store, arrival: Arrival, there: Callable[[], bool], *, archived: bool = False) -> tuple[str, bool]:
-    """Adds a frame to the queue, durably; its id, and whether it is new.
+def record(
+    store: Store, connection: Connection, arrival: Arrival, there: Callable[[], bool], *, archived: bool = False
+) -> tuple[str, bool]:
+    """Adds a frame to the queue; its id, and whether it is new.
 
     A frame whose bytes were lost is queued again with the new ones. Raises `BytesGone` unless the bytes are `there`
     while nothing can remove them.
     """
-    with store.write() as connection:
-        store.while_blobs_stay(connection)
-        if not there():
-            raise BytesGone
-        frame_id = new_id()
-        row = {name: getattr(arrival, name) for name in Arrival.__dataclass_fields__}
-        row |= {"id": frame_id, "kept": True, "state": QUEUED, "attempts": 0, "not_before": 0}
-        if store.insert_new(connection, frame, row):
-            return frame_id, True
-        found = find(connection, arrival.camera, arrival.sha256)
-        if found is not None and lost(found):
-            again = {"kept": True, "state": QUEUED, "attempts": 0, "not_before": 0, "error": None}
-            connection.execute(update(frame).where(frame.c.id == found.id).values(**again))
-            return str(found.id), True
-        if found is not None and archived and not found.kept:
-            connection.execute(update(frame).where(frame.c.id == found.id).values(kept=True, bytes=arrival.bytes))
-            return str(found.id), True
-        return str(found.id if found else frame_id), False
+    if not there():
+        raise BytesGone
+    frame_id = new_id()
+    row = {name: getattr(arrival, name) for name in Arrival.__dataclass_fields__}
+    row |= {"id": frame_id, "kept": True, "state": QUEUED, "attempts": 0, "not_before": 0}
+    if store.insert_new(connection, frame, row):
+        return frame_id, True
+    found = find(connection, arrival.camera, arrival.sha256)
+    if found is not None and lost(found):
+        again = {"kept": True, "state": QUEUED, "attempts": 0, "not_before": 0, "error": None}
+        connection.execute(update(frame).where(frame.c.id == found.id).values(**again))
+        return str(found.id), True
+    if found is not None and archived and not found.kept:
+        connection.execute(update(frame).where(frame.c.id == found.id).values(kept=True, bytes=arrival.bytes))
+        return str(found.id), True
+    return str(found.id if found else frame_id), False
 
 
 def lost(row: Record) -> bool:
@@ -91,19 +94,24 @@ def claim(store: Store, now: int, until: int = 0) -> Record | None:
     A process that has not settled it `until` then is taken for gone (`requeue_interrupted`).
     """
     with store.write() as connection:
-        wanted = (
-            select(frame.c.id)
-            .where(frame.c.state == QUEUED, frame.c.not_before <= now)
-            .order_by(frame.c.captured.desc())
-            .limit(1)
-            .with_for_update(skip_locked=True)
-        )
-        found = connection.execute(wanted).scalar()
-        if found is None:
-            return None
-        taken = {"state": MEASURING, "attempts": frame.c.attempts + 1, "not_before": until}
-        connection.execute(update(frame).where(frame.c.id == found).values(**taken))
-        return get(connection, found)
+        return claimed(connection, now, until)
+
+
+def claimed(connection: Connection, now: int, until: int) -> Record | None:
+    """The same within a transaction, such as that which settles the frame before."""
+    wanted = (
+        select(frame.c.id)
+        .where(frame.c.state == QUEUED, frame.c.not_before <= now)
+        .order_by(frame.c.captured.desc())
+        .limit(1)
+        .with_for_update(skip_locked=True)
+    )
+    found = connection.execute(wanted).scalar()
+    if found is None:
+        return None
+    taken = {"state": MEASURING, "attempts": frame.c.attempts + 1, "not_before": until}
+    connection.execute(update(frame).where(frame.c.id == found).values(**taken))
+    return get(connection, found)
 
 
 def settle(connection: Connection, frame_id: str, silo: str, state: str, now: int, **more: Any) -> None:

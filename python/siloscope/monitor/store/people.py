@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import Connection, delete, func, insert, select, update
+from sqlalchemy import Connection, bindparam, delete, func, insert, select, update
 
 from siloscope.monitor.store.engine import new_id
 from siloscope.monitor.store.rows import Record
@@ -112,10 +112,13 @@ def add_token(connection: Connection, hashed: str, role: str, camera: str | None
     return key
 
 
+OF_HASH = select(token).where(token.c.hash == bindparam("told"), token.c.revoked.is_(None))
+"""Every request with a token asks it; made once."""
+
+
 def token_of(connection: Connection, hashed: str) -> Record | None:
     """The token that hashes to this, unless revoked."""
-    chosen = [token.c.hash == hashed, token.c.revoked.is_(None)]
-    return connection.execute(select(token).where(*chosen)).one_or_none()
+    return connection.execute(OF_HASH, {"told": hashed}).one_or_none()
 
 
 def tokens(connection: Connection) -> Sequence[Record]:
