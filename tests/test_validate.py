@@ -30,6 +30,7 @@ from siloscope.validation.frames import MOST_FRAMES, Asked, SeenFrame, read
 from siloscope.validation.ideal import Ideal, fitted
 from siloscope.validation.levels import by_level
 from siloscope.validation.significance import deviation
+from siloscope.validation.tiles import against
 
 SENSOR = replace(ASTRA_S, unit=1e-3)
 LEVELS = (0.45, 0.4, 0.33, 0.27, 0.2, 0.15, 0.1, 0.05)
@@ -189,6 +190,16 @@ def test_readings_that_change_from_frame_to_frame_are_unsteady() -> None:
     signs = (1.0, -1.0) * (len(LEVELS) // 2)
     found = validated([warped(depth, 0.004 * sign) for depth, sign in zip(depths(), signs, strict=True)])
     assert "unsteady" in {one.code for one in found.findings}
+
+
+def test_a_cone_of_feed_is_no_vessels_cone() -> None:
+    one = seen()[-1]
+    feed = replace(one, factor=replace(one.factor, model="free-cone"))
+    assert against([one], ideal().wall).on_cone.any()
+    assert not against([feed], ideal().wall).on_cone.any()
+    straight = replace(ideal().wall, has_cone=False)  # whose cylinder goes on behind the cone
+    assert (np.abs(against([feed.without_feed()], straight).residual) < 0.05).all()
+    assert (np.abs(against([feed], straight).residual) > 0.05).any()
 
 
 def test_levels_have_every_frame_once_and_the_fullest_first() -> None:

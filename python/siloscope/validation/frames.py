@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from siloscope import sensors
+from siloscope import _core, sensors
 from siloscope.errors import InputError
 from siloscope.estimation.inputs import PreparedDepth, prepare
 from siloscope.estimation.methods import priors_of
@@ -23,6 +23,11 @@ from siloscope.types.estimate import Estimate
 from siloscope.types.frame import Frame
 from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.intrinsics import IntrinsicsStd
+from siloscope.types.wall import Wall
+
+COAXIAL = ("coaxial-cone", "cone-alone")
+OBLIQUE = ("oblique-cone", "oblique-cone-alone")
+"""Models of the joint fit whose cone is the vessel's own."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +45,21 @@ class SeenFrame:
     """Which of its tiles show the wall by its own answer."""
     refused: str | None = None
     """Why the vessels of the joint fit gave no answer; the estimate then is that of an ideal coaxial one."""
+
+    @property
+    def shows_vessels_cone(self) -> bool:
+        """Whether its cone, if any, is the vessel's: another conical surface is one of feed."""
+        return self.factor.model in COAXIAL + OBLIQUE
+
+    def without_feed(self) -> SeenFrame:
+        """Without the tiles of a conical surface that is not the vessel's."""
+        own = self.factor
+        if self.shows_vessels_cone or not own.has_cone:
+            return self
+        tiles = _core.wall_tiles(self.frame, self.priors, Wall(own.state, own.has_cylinder, True, own.reference))
+        shown = np.zeros_like(self.shown)
+        shown[tiles.number[~tiles.on_cone].astype(np.int64)] = True
+        return replace(self, shown=self.shown & shown)
 
 
 @dataclass(frozen=True)
@@ -141,4 +161,4 @@ def _located(name: str, frame: Any, asked: Asked, start: Estimate | None) -> See
     if answer.details is None or answer.evidence is None:
         return refused or "refused"
     shown = np.isfinite(answer.details.residuals)
-    return SeenFrame(name, depth, priors, answer, answer.evidence, shown, refused)
+    return SeenFrame(name, depth, priors, answer, answer.evidence, shown, refused).without_feed()

@@ -14,14 +14,10 @@ from numpy.typing import NDArray
 
 from siloscope.estimation.priors import Priors
 from siloscope.types.wall import COLUMNS, INTERCEPT, OBLIQUITY, OFFSET, RADIUS, SIZE, SLOPE, Wall
-from siloscope.validation.frames import SeenFrame
+from siloscope.validation.frames import OBLIQUE, SeenFrame
 from siloscope.validation.tiles import Tiles, against
 
 Vector = NDArray[np.float64]
-
-COAXIAL = ("coaxial-cone", "cone-alone")
-OBLIQUE = ("oblique-cone", "oblique-cone-alone")
-"""Models of the joint fit whose cone is the vessel's own."""
 
 TOLERANCE, LEANING = 0.005, 0.4
 """Building tolerance of a cone against its cylinder, and an oblique hopper's obliquity, as in the joint fit."""
@@ -64,7 +60,7 @@ def first_wall(frames: Sequence[SeenFrame]) -> Wall:
     Its cone only where most frames that see one call it the vessel's own.
     """
     cones = [one for one in frames if one.factor.has_cone]
-    trusted = [one for one in cones if one.factor.model in COAXIAL + OBLIQUE]
+    trusted = [one for one in cones if one.shows_vessels_cone]
     with_cone = 2 * len(trusted) > len(cones) > 0
     factor = max(trusted if with_cone else frames, key=lambda one: int(one.shown.sum())).factor
     state = np.zeros(SIZE)

@@ -78,7 +78,7 @@ def _of_frame(number: int, one: SeenFrame, wall: Wall) -> Tiles:
     found = _core.wall_tiles(one.frame, one.priors, wall)
     spot = found.place.astype(np.int64)
     shown = _inside(one.shown[found.number.astype(np.int64)], spot)
-    shown &= np.where(found.on_cone, wall.has_cone, wall.has_cylinder)
+    shown &= np.where(found.on_cone, wall.has_cone and one.shows_vessels_cone, wall.has_cylinder)
     return Tiles(
         np.full(len(spot), number),
         spot[:, 1] * MOST_COLUMNS + spot[:, 0],
