@@ -12,6 +12,8 @@ if sys.version_info >= (3, 14):
 else:
     from backports import zstd
 
+__all__ = ["DamagedError", "content_size", "steps", "zstd"]
+
 WINDOW_LOG = 27
 """Largest window that is unpacked, as a power of two: 128 MB, what the command line tool allows."""
 
