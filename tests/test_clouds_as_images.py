@@ -141,6 +141,12 @@ def test_axes_that_are_none_are_refused(axes: str | None, up: str | None, why: s
         checked_axes(axes, up)
 
 
+def test_the_left_handed_coordinates_of_an_oak_have_a_name() -> None:
+    written = POINTS[DEPTH > 0] * (1.0, -1.0, 1.0)
+    there = siloscope.locate(optical(Frame(points=written), checked_axes("oak", None)), sensor=SENSOR)
+    assert numbers(there) == pytest.approx(numbers(siloscope.locate(POINTS[DEPTH > 0], sensor=SENSOR)), abs=1e-9)
+
+
 def test_up_is_the_axis_against_which_z_points() -> None:
     for up, down in (("z", "-z"), ("-z", "z"), ("y", "-y"), ("-x", "x")):
         turn = checked_axes(None, up)

@@ -41,7 +41,7 @@ Trust = Annotated[
 ]
 Axes = Annotated[
     str | None,
-    typer.Option("--axes", metavar="X,Y,Z", help="A cloud's axes that are right, down, forward, such as x,-y,-z."),
+    typer.Option("--axes", metavar="X,Y,Z", help="A cloud's axes right, down and forward, such as x,-y,-z; or oak."),
 ]
 Up = Annotated[str | None, typer.Option("--up", metavar="AXIS", help="A cloud's axis that points upwards: z, -y, ….")]
 Cylinder = Annotated[

@@ -39,6 +39,11 @@ and Viewer's (y up, z backwards; also a frame with z up over which the sensor ha
 the like."""
 
 
+NAMED_AXES = {"oak": ("x", "-y", "z")}
+"""Axes that have a name: OAK cameras' spatial coordinates, x right, y up, z forward, a left-handed frame. Such a cloud
+is mirrored to the optical frame, and no cloud shows by itself that it needs to be."""
+
+
 @dataclass(frozen=True)
 class Turn:
     """How a cloud was turned to the optical frame."""
@@ -50,7 +55,7 @@ class Turn:
 
     @property
     def rotation(self) -> Matrix:
-        """(3, 3): ``p_optical = rotation @ p_file``."""
+        """(3, 3): ``p_optical = rotation @ p_file``; a reflection for a left-handed file's frame."""
         return np.stack([_unit(name) for name in self.axes])
 
     @property
@@ -78,12 +83,16 @@ def checked_axes(axes: str | None, up: str | None) -> Turn | None:
         return Turn(OPTICAL_AXES[_opposite(up)])
     if axes is None:
         return None
+    if axes in NAMED_AXES:
+        return Turn(NAMED_AXES[axes])
     names = tuple(part.strip() for part in axes.split(","))
     if len(names) != 3 or any(name not in SIGNED for name in names):
-        raise UsageError(f"axes '{axes}': give the file's axes that are right, down and forward, such as x,-y,-z")
+        raise UsageError(
+            f"axes '{axes}': give the file's axes that are right, down and forward, such as x,-y,-z, or oak"
+        )
     turn = Turn((names[0], names[1], names[2]))
     if round(float(np.linalg.det(turn.rotation))) != 1:
-        raise UsageError(f"axes '{axes}' are no right-handed frame; one of the signs is wrong")
+        raise UsageError(f"axes '{axes}' are no right-handed frame; one of the signs is wrong (OAK's are named oak)")
     return turn
 
 
