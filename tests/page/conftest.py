@@ -25,6 +25,8 @@ import siloscope  # noqa: E402
 
 PAGE = Path(siloscope.__file__).parent / "monitor" / "page"
 
+AXE = Path(__file__).parents[2] / "web" / "node_modules" / "axe-core" / "axe.min.js"
+
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 
 WITHOUT_WEBGL = ("--disable-gpu", "--disable-3d-apis", "--disable-software-rasterizer")
@@ -106,6 +108,18 @@ def wait_for(true: Any, seconds: float, otherwise: str) -> None:
 def until(page: Any, expression: str, seconds: float = 30.0) -> None:
     """Waits until an expression holds in the page. Playwright's own way needs `eval`, which the policy forbids."""
     wait_for(lambda: page.evaluate(expression), seconds, f"it never becomes true: {expression}")
+
+
+def grave(page: Any) -> list[tuple[str, str, str]]:
+    """What axe finds serious or critical in a page as it stands: rule, element, what to do."""
+    page.evaluate(AXE.read_text())
+    found = page.evaluate("axe.run()")
+    assert len(found["passes"]) > 10
+    return [
+        (one["id"], one["nodes"][0]["html"][:200], one["nodes"][0]["failureSummary"])
+        for one in found["violations"]
+        if one["impact"] in ("serious", "critical")
+    ]
 
 
 @pytest.fixture(scope="session")

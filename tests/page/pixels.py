@@ -16,6 +16,12 @@ def of(locator: Any) -> NDArray[np.int64]:
     return np.asarray(picture, np.int64)
 
 
+def shot(page: Any, clip: dict[str, float]) -> NDArray[np.int64]:
+    """(H, W, 3) colours of a part of the window as it stands, without scrolling."""
+    picture = Image.open(io.BytesIO(page.screenshot(clip=clip))).convert("RGB")
+    return np.asarray(picture, np.int64)
+
+
 def colours(pixels: NDArray[np.int64]) -> int:
     """Number of different colours."""
     flat = pixels.reshape(-1, 3)

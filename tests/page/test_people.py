@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from page.conftest import Running, visiting
+from page.conftest import AXE, DESK, PHONE, Running, grave, visiting
 
 PASSWORD = "correct horse battery"
 
@@ -60,6 +60,22 @@ def invited(chromium: Any, company: Running, admin: Any, name: str, role: str) -
         link.wait_for()
         assert visit.errors == []
         return str(link.inner_text())
+
+
+@pytest.mark.parametrize("theme", ["light", "dark"])
+@pytest.mark.parametrize("size", [PHONE, DESK], ids=["phone", "desk"])
+def test_axe_finds_nothing_serious_on_people(
+    chromium: Any, company: Running, admin: Any, theme: str, size: dict[str, int]
+) -> None:
+    if not AXE.is_file():
+        pytest.skip("axe-core is missing: make page")
+    settings = {"storage_state": admin, "color_scheme": theme, "viewport": size}
+    with visiting(chromium, company.root, **settings) as visit:
+        page = visit.open("#/settings")
+        page.get_by_role("region", name="People").wait_for()
+        assert grave(page) == []
+        page.evaluate("window.scrollTo(0, document.body.scrollHeight)")
+        assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
 
 
 def test_the_lowest_role_sees_percent_and_nothing_else(chromium: Any, company: Running, admin: Any) -> None:

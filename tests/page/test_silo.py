@@ -171,3 +171,20 @@ def test_nothing_is_wider_than_the_screen(chromium: Any, farm: Running, width: i
         page = visit.open("#/silos/north-1")
         surface(page)
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_the_surface_is_whole_below_the_bars_of_a_phone(phone: Visit) -> None:
+    """An opaque bar over the canvas's lower end must not cost its upper one."""
+    page = phone.open("#/silos/north-2")
+    canvas = page.locator("canvas.solid[data-drawn]")
+    canvas.wait_for()
+    top = canvas.bounding_box()["y"]
+    rows = []
+    for shown in (844 - 300, 200):  # 62 of its 320 pixels below the lower bar; none
+        page.evaluate(f"window.scrollTo(0, {top - shown})")
+        page.wait_for_timeout(500)
+        box = canvas.bounding_box()
+        clip = {"x": box["x"], "y": box["y"], "width": box["width"], "height": 60}
+        rows.append(pixels.shot(page, clip))
+    assert pixels.colours(rows[1]) > 20
+    assert pixels.different(*rows) < 0.02

@@ -23,7 +23,7 @@ import { TrendPanel } from "./silo-trend.tsx";
 export function SiloView({ id, tab }: { id: string; tab: Tab }) {
   const { t } = useWords();
   const path = `silos/${encodeURIComponent(id)}`;
-  const silo = useResource<Silo>(path, "silo", "reading", "alert", "forecast", "frame", `of:${id}`);
+  const silo = useResource<Silo>(path, "silo", "camera", "reading", "alert", "forecast", "frame", `of:${id}`);
   const alerts = useFiring().filter((alert) => alert.silo === id);
   if (!silo.data) return <Waiting resource={silo} />;
   const { role, zone } = silo.data;
