@@ -84,7 +84,7 @@ class Calibrating:
         if len(newest) < MOVED or not all(moved(reading) for reading in newest):
             return
         with self._store.write() as connection:
-            places.set_moved(connection, camera.id, newest[-1].time)
+            places.set_moved(connection, camera.id, newest[-1].time, self._clock.now())
 
     def _propose(self, camera: Any) -> None:
         with self._store.read() as connection:
@@ -122,7 +122,7 @@ class Calibrating:
             found = places.confirm(connection, key, who, self._clock.now())
             if found is None:
                 return False
-            places.set_moved(connection, found.camera, None)
+            places.set_moved(connection, found.camera, None, self._clock.now())
             run = readings.run_of(
                 connection, _core.__version__, found.sha256, "recomputed", self._clock.now(), "confirmed"
             )

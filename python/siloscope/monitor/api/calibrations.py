@@ -78,7 +78,7 @@ def put_calibration(
         if len(chosen) != 1:
             raise Problem("invalid", f"'camera': name one of {', '.join(row.id for row in cameras) or 'none'}")
         places.close(connection, chosen[0].id, now)
-        places.set_moved(connection, chosen[0].id, None)
+        places.set_moved(connection, chosen[0].id, None, now)
         row = {"origin": "uploaded", "state": places.CONFIRMED, "valid_from": now, "confirmed_by": person.name}
         count = len(document.get("frames", ()))
         key = places.add_calibration(connection, silo.row.id, chosen[0].id, document, now, frames=count, **row)

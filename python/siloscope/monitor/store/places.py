@@ -182,9 +182,10 @@ def reject(connection: Connection, key: str, who: str, now: int) -> bool:
     return bool(made.rowcount)
 
 
-def set_moved(connection: Connection, camera_id: str, since: int | None) -> None:
+def set_moved(connection: Connection, camera_id: str, since: int | None, now: int) -> None:
     """Notes since when a camera does not stand where its calibration has it."""
-    connection.execute(update(camera).where(camera.c.id == camera_id).values(moved_since=since))
+    changed = update(camera).where(camera.c.id == camera_id).values(moved_since=since).returning(camera.c.silo)
+    changes.note(connection, "camera", camera_id, connection.execute(changed).scalar(), now)
 
 
 def document(row: Record) -> dict[str, Any]:
