@@ -40,7 +40,7 @@ def plan_command(
 
     [bold]Example:[/bold] siloscope plan silo7.toml --sensor orbbec-astra-s --out plan.png
 
-    Nothing is drawn at random: the surface fit's covariance at the exact answer holds what noise, bias, form of the
+    The surface fit's covariance, with the same draw of the noise at each place, holds what noise, bias, form of the
     wall and intrinsics leave open. Places are ordered by how many levels one frame alone answers, then by the volume's
     deviation. The last line lists the levels of which a calibration needs a frame.
     """

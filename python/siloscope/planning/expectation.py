@@ -1,4 +1,4 @@
-"""What one frame from a place would say: the fit's covariance at the exact answer."""
+"""What one frame from a place would say: the fit's covariance for exact depths with one draw of the noise."""
 
 from __future__ import annotations
 
@@ -90,11 +90,14 @@ class Expected:
 
 
 def expected(view: View, placement: Placement, level: float) -> Expected:
-    """The pose's deviations: exact depths go through the fit, so its residuals are zero and its covariance is what
-    noise, form, intrinsics and bias leave open."""
+    """The pose's deviations: what noise, form, intrinsics and bias leave open to the fit of one frame.
+
+    The frame has the same draw of the noise at every place: in depths without any the fit sees forms of the wall in
+    micrometres that no frame shows.
+    """
     depth = exact_depth(view.inside, view.camera, placement.pose, level)
     warnings = [*out_of_range(view, depth), *little_in_view(depth)]
-    read = within_range(view, depth)
+    read = with_noise(view.sensor, depth, within_range(view, depth))
     estimate = locate(read, view.camera, sensor=view.sensor, intrinsics=view.intrinsics)
     if estimate.covariance is None:
         return Expected(level, estimate.reason, None, None, tuple(warnings), estimate=estimate, depth=read)
@@ -115,6 +118,16 @@ def within_range(view: View, depth: Any) -> Any:
     offset, scale, quadratic = view.sensor.bias
     read = depth + np.where(depth > 0.0, offset + scale * depth + quadratic * depth**2, 0.0)
     return np.where((read >= low) & (read <= high), read, 0.0)
+
+
+def with_noise(sensor: SensorProfile, depth: Any, read: Any) -> Any:
+    """Depths with the noise of a sensor whose law is known, the same draw each time."""
+    if sensor.noise is None:
+        return read
+    floor, constant, linear, quadratic, factor, power = sensor.noise
+    sigma = np.maximum(floor, constant + linear * depth + quadratic * depth**2 + factor * depth**power)
+    drawn = np.random.default_rng(0).standard_normal(depth.shape)
+    return np.where(read > 0.0, read + sigma * drawn, 0.0)
 
 
 def out_of_range(view: View, depth: Any) -> list[str]:

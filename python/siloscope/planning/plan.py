@@ -103,7 +103,7 @@ def plan(
 ) -> Plan:
     """Compare places for a camera under a vessel's roof by the deviations to expect there.
 
-    Every place is judged by the covariance of the surface fit at the exact answer (no noise is drawn): what noise,
+    Every place is judged by the covariance of the surface fit of a frame with one draw of the noise: what noise,
     bias, form of the wall and intrinsics leave open. Places are ordered by how many levels are answered, then by the
     volume's deviation, or the axis' where there is none.
 
