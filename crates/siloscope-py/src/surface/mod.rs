@@ -16,7 +16,8 @@ use siloscope::base::workers::Workers;
 use siloscope::geometry::parameters::PARAMETERS;
 use siloscope::geometry::sensor::DepthBias;
 use siloscope::geometry::surface::SiloSurface;
-use siloscope::surface_fit::{fit_cloud, fit_image, orthogonal};
+use siloscope::surface_fit::cloud::fit_cloud;
+use siloscope::surface_fit::{fit_image, orthogonal};
 use warm_start::WarmStart;
 
 /// A fit, or why there is none.

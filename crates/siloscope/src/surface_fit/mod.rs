@@ -1,6 +1,7 @@
 //! The surface fit: a depth frame in, the silo's wall as cylinder and cone out, with its covariance.
 
 pub mod bow;
+pub mod cloud;
 pub mod cloud_equations;
 pub mod cloud_tiles;
 pub mod common;
@@ -20,6 +21,7 @@ pub mod outcome;
 pub mod outermost;
 pub mod parts;
 pub mod polish;
+pub mod profile_parts;
 pub mod proposals;
 pub mod residual;
 pub mod segmentation;
@@ -27,25 +29,21 @@ pub mod solver;
 pub mod state;
 pub mod taper;
 pub mod tile_plane;
+pub mod tile_rays;
 pub mod tiles;
 pub mod vertex;
 pub mod warm_start;
 
-use crate::Result;
 use crate::SiloPose;
 use crate::Vec3;
 use crate::base::clock::Clock;
 use crate::base::refusal::Refusal;
-use crate::base::workers::Workers;
 use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::parameters::{BIAS, Information, OVALITY, PARAMETERS};
-use crate::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
+use crate::geometry::sensor::NoiseLaw;
 use crate::geometry::surface::SurfaceTolerance;
-use crate::stats::voxel_grid::voxel_grid;
 use crate::surface_fit::bow::bow_uncertainty;
-use crate::surface_fit::cloud_equations::CloudWall;
-use crate::surface_fit::cloud_tiles::cloud_patches;
 use crate::surface_fit::common::lasting_misfit;
 use crate::surface_fit::covariance::{
     relief, relief_beside_noise, relief_uncertainty, scale_uncertainty, shows_ovality, widened,
@@ -70,7 +68,6 @@ use crate::surface_fit::warm_start::{KnownWall, confirmed};
 const WALL_FORM: f64 = 2.5e-4;
 /// The same as a multiple of the misfit that the tiles show: what stuck feed and dents do to neighbouring tiles alike.
 const MISFIT_FORM: f64 = 2.0;
-
 /// Misfit that chance alone shows on a smooth wall, metres.
 const CHANCE_MISFIT: f64 = 2e-4;
 
@@ -256,58 +253,6 @@ impl SurfaceFit {
         let inwards = |p: &Patch| placed.turn(&p.normal).dot(&placed.local(&p.origin).gradient) < 0.0;
         let votes: i64 = wall.map(|(_, p)| if inwards(p) { 1 } else { -1 }).sum();
         votes > 0
-    }
-}
-
-/// Fits the wall to a cloud of points in the camera's frame, thinned by a voxel grid with cells of `grid` metres.
-///
-/// A cloud may be seen from inside or outside, and its origin need not be a camera: residuals are distances from the
-/// wall, weighed by each patch's own scatter, and normals have no sign.
-pub fn fit_cloud(points: &[Vec3], grid: f64, workers: &Workers, know: &Knowledge) -> Result<Outcome> {
-    let mut clock = Clock::start();
-    let cloud = voxel_grid(points, grid, workers)?;
-    let mut patches = cloud_patches(&cloud, workers)?;
-    if patches.list.len() < 30 {
-        return Ok(Err(Refusal::NoDepth));
-    }
-    clock.lap("patches");
-    let exact = DepthError { bias: DepthBias::default(), bias_std: [0.0; 3], noise: None };
-    let prior = prior(&Knowledge { error: exact, ..know.clone() });
-    let noise = NoiseLaw::uniform(1e-3); // not used: patches of a cloud carry their own scatter
-    let found = match coarse_fit(&mut patches, noise, &prior, 0.0).0 {
-        Ok(found) => found,
-        Err(refusal) => return Ok(Err(refusal)),
-    };
-    clock.lap("coarse fit");
-    let on_wall = cloud.of_points(points, &found.wall);
-    let mut result = match tiled(&CloudWall { points, on_wall: &on_wall, grid }, (noise, &prior), found) {
-        Ok(found) => found,
-        Err(refusal) => return Ok(Err(refusal)),
-    };
-    clock.lap("covariance");
-    result.timing = clock.laps();
-    result.fit.inside = result.is_seen_from_inside();
-    Ok(Ok(result))
-}
-
-/// The wall that a cloud's voxels have settled on, measured by the points of its surface's tiles.
-fn tiled(cloud: &CloudWall, (noise, prior): (NoiseLaw, &Prior), found: Settled) -> Outcome {
-    let known = KnownWall::of(&found);
-    let Settled { mut fit, evidence, bare, .. } = found;
-    fit.surface = fit.surface.without(bare);
-    let mut rounds = 0;
-    loop {
-        let tiles = cloud.tiles(fit.surface);
-        let problem = Problem { patches: &tiles.patches, noise, prior, pixel: 0.0 };
-        let mut equations = tiles.equations(&problem, &fit);
-        let mut result = finish(&problem, fit.clone(), &mut equations, (evidence, known), 0.0)?;
-        let settled = rounds > 0 && result.fit.surface.is_near(&fit.surface, &LINEAR);
-        if settled || rounds == MOST_ROUNDS {
-            result.patches = tiles.patches;
-            return Ok(result);
-        }
-        fit = result.fit;
-        rounds += 1;
     }
 }
 

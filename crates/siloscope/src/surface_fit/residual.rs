@@ -4,7 +4,8 @@ use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::sensor::DepthBias;
 use crate::geometry::surface::Part;
-use crate::surface_fit::tiles::{MAX_SIDE, Patch, Patches, TileRays};
+use crate::surface_fit::tile_rays::TileRays;
+use crate::surface_fit::tiles::{MAX_SIDE, Patch, Patches};
 
 /// Mean residual of a tile's pixels; no count where the tile does not lie wholly on one part of the wall.
 #[derive(Debug, Clone, Copy, Default)]

@@ -8,6 +8,7 @@
 pub mod against;
 pub mod answer;
 pub mod average;
+pub mod blocks;
 pub mod correlation;
 pub mod ends;
 pub mod factor;
@@ -51,7 +52,7 @@ use crate::surface_fit::model_selection::{Settled, oriented};
 use crate::surface_fit::outcome::{
     Knowledge, MAX_DIRECTION_STD, MAX_POSITION_STD, Outcome, SurfaceFit, Vessels, check_determined,
 };
-use crate::surface_fit::proposals::other_part;
+use crate::surface_fit::profile_parts::other_part;
 use crate::surface_fit::solver::{Fit, Problem};
 use crate::surface_fit::tiles::{NONE, Patches};
 use crate::surface_fit::vertex::is_covered;

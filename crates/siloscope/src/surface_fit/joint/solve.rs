@@ -1,11 +1,12 @@
 //! The joint fit of one model: relinearise, label, solve, and learn the widths, until it stands.
 
 use crate::geometry::surface::Part;
+use crate::surface_fit::joint::blocks::Blocks;
 use crate::surface_fit::joint::correlation::correlation_factor;
 use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::labels::{LabelModel, Labels, label};
 use crate::surface_fit::joint::model::{Amplitudes, Model, prior};
-use crate::surface_fit::joint::parameters::{COMMON, CYLINDER_END, INTERCEPT, JointState, RADIUS, SIZE, SLOPE};
+use crate::surface_fit::joint::parameters::{COMMON, INTERCEPT, JointState, RADIUS, SIZE, SLOPE};
 use crate::surface_fit::joint::pixels::pixel_means;
 use crate::surface_fit::joint::predict::{Predictor, Sight, own_columns};
 use crate::surface_fit::joint::readings::Readings;
@@ -205,29 +206,20 @@ impl JointFit {
 
     /// The frame's sum of squares; tiles of a part in the same 2 × 2 block count as one, with their mean row.
     fn accumulate(&self, frame: &Frame, rows: &Rows) -> Quadratic {
-        let mut sums = Accumulator::default();
-        let blocks = frame.readings.patches.columns / 2 + 1;
-        let mut open: Vec<[Option<Block>; 2]> = vec![[None, None]; blocks];
-        let (mut start, mut band) = (0, u32::MAX);
+        let patches = frame.readings.patches;
+        let mut blocks = Blocks::new(patches.columns);
+        let mut start = 0;
         for (&i, &width) in rows.tiles.iter().zip(&rows.widths) {
             let values = &rows.values[start..start + width];
             start += width;
             let Some(sight) = self.sights[i] else { continue };
             let part = usize::from(sight.at.part == Part::Cone);
             let weight = self.labels.wall[i] / (self.labels.variance[i] * self.correlation[part]);
-            if weight.is_nan() || weight <= 0.0 {
-                continue;
+            if weight > 0.0 {
+                blocks.add(patches.list[i].tile, sight.at.part, values, (sight.residual, weight));
             }
-            let (column, row) = frame.readings.patches.list[i].tile;
-            if row / 2 != band {
-                open.iter_mut().for_each(|parts| flush(parts, &mut sums));
-                band = row / 2;
-            }
-            let block = open[column as usize / 2][part].get_or_insert_with(Block::default);
-            block.add(values, sight.residual, weight);
         }
-        open.iter_mut().for_each(|parts| flush(parts, &mut sums));
-        sums.quadratic()
+        blocks.quadratic()
     }
 
     fn move_residuals(&mut self, rows: &Rows, step: &[f64; SIZE], factor: f64) {
@@ -293,40 +285,6 @@ struct Pass {
     learn: bool,
     /// Reweighted solutions.
     inner: usize,
-}
-
-/// Tiles of one part in a block of 2 × 2: their weighted sums.
-#[derive(Debug, Clone)]
-struct Block {
-    row: [f64; CYLINDER_END],
-    width: usize,
-    residual: f64,
-    weight: f64,
-}
-
-impl Default for Block {
-    fn default() -> Self {
-        Self { row: [0.0; CYLINDER_END], width: 0, residual: 0.0, weight: 0.0 }
-    }
-}
-
-impl Block {
-    #[inline]
-    fn add(&mut self, row: &[f64], residual: f64, weight: f64) {
-        self.row.iter_mut().zip(row).for_each(|(sum, value)| *sum += weight * value);
-        self.width = row.len();
-        self.residual += weight * residual;
-        self.weight += weight;
-    }
-}
-
-fn flush(parts: &mut [Option<Block>; 2], sums: &mut Accumulator) {
-    for (block, part) in parts.iter_mut().zip([Part::Cylinder, Part::Cone]) {
-        if let Some(Block { row, width, residual, weight }) = block.take() {
-            // Σw (Σw J / Σw)(Σw J / Σw)ᵀ = (Σw J)(Σw J)ᵀ / Σw
-            sums.add(part, &row[..width], residual, 1.0 / weight);
-        }
-    }
 }
 
 /// Factor that keeps a step within what the equations are good for.
