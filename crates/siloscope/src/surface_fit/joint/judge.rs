@@ -16,8 +16,10 @@ use crate::surface_fit::joint::solve::JointFit;
 const MOST_TAU: f64 = 0.012;
 /// The same for what its tiles have in common: model error times the root of the correlation factor.
 const MOST_IN_COMMON: f64 = 0.015;
-/// Largest correlation factor of a wall.
+/// Largest correlation factor of a wall, and what its tiles must have in common for that to be another surface's, as a
+/// fraction of the radius: ten times less than what is one by its size alone.
 const MOST_CORRELATION: f64 = 45.0;
+const LEAST_IN_COMMON: f64 = 0.0015;
 /// Fewer tiles of the cylinder than these don't fix where it is.
 const LEAST_CYLINDER: f64 = 12.0;
 /// Fewer than this fraction leave it to the cone where the axis runs: it must be round and steeper than feed.
@@ -68,7 +70,8 @@ pub fn judge(frame: &Frame, search: &Search, known: bool) -> Result<(), Refusal>
     let size = fit.state.size();
     let lead = leading_part(fit, best.model);
     let in_common = fit.tau[lead] * fit.correlation[lead].sqrt();
-    if fit.tau[0] > MOST_TAU * size || in_common > MOST_IN_COMMON * size || fit.correlation[lead] > MOST_CORRELATION {
+    let correlated = fit.correlation[lead] > MOST_CORRELATION && in_common > LEAST_IN_COMMON * size;
+    if fit.tau[0] > MOST_TAU * size || in_common > MOST_IN_COMMON * size || correlated {
         return Err(Refusal::NoWall);
     }
     if frame.inputs.gravity.is_some() && !agrees {
