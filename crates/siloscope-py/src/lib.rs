@@ -17,6 +17,7 @@ mod inputs;
 mod outcome;
 mod scene;
 mod shape_tensor_fit;
+mod six_steps;
 mod steps;
 mod surface;
 
@@ -36,6 +37,7 @@ fn _core(m: &Bound<'_, PyModule>) -> PyResult<()> {
     scene::register(m)?;
     surface::register(m)?;
     steps::register(m)?;
+    six_steps::register(m)?;
     Ok(())
 }
 

@@ -3,15 +3,8 @@
 //! An error of the focal lengths, of the principal point or of the depth's scale maps space linearly, and with it every
 //! line on the wall: the axis goes along. Any other one bends the wall, and the steps run again on the points without it.
 
-use crate::base::clock::Clock;
 use crate::base::refusal::Refusal;
-use crate::base::workers::Workers;
-use crate::geometry::normals::normals;
 use crate::geometry::sensor::DepthBias;
-use crate::geometry::view::View;
-use crate::shape_tensor::profile::fit_profile;
-use crate::shape_tensor::tensors::shape_tensors;
-use crate::shape_tensor::{Located, Outcome, Settings, Surface, axis_of};
 use crate::{SiloPose, Vec3};
 use nalgebra::{Matrix3, Vector4};
 
@@ -69,49 +62,50 @@ impl Bend {
     }
 }
 
-/// The answer with the share of the sensor's and the camera's errors in its covariances.
+/// A cloud with its normals, and its axis.
+pub struct Placed {
+    /// Points, metres.
+    pub points: Vec<Vec3>,
+    /// Their unit normals.
+    pub normals: Vec<Vec3>,
+    /// The pose by its axis.
+    pub pose: SiloPose,
+}
+
+/// The answers without one standard deviation of each error, one after the other; `again` runs the steps on other points.
 ///
 /// Refused where the steps find no axis without one of them.
-pub(super) fn with_errors(
-    located: Located,
-    (surface, view): (&Surface, View),
-    settings: &Settings,
-    workers: &Workers,
-) -> Outcome {
-    let mut sum = located.clone();
-    let side = settings.block();
-    let mut add = |pose: SiloPose, points: &[Vec3], normals: &[Vec3]| {
-        let step = difference(&pose, &located.pose);
-        sum.covariance += step * step.transpose();
-        sum.profile.add_step(&located.profile, &fit_profile(points, normals, &pose, side));
-    };
-    let (points, near) = (&surface.cloud.points, surface.near);
-    for map in settings.errors.maps() {
-        let turn = map.try_inverse().unwrap_or_else(Matrix3::identity).transpose();
-        let points: Vec<Vec3> = points.iter().map(|p| map * p).collect();
-        let normals: Vec<Vec3> = surface.normals.iter().map(|n| (turn * n).normalize()).collect();
-        add(mapped(&located.pose, &map), &points, &normals);
+pub fn without_each(
+    errors: &SensorErrors,
+    found: &Placed,
+    again: impl Fn(Vec<Vec3>) -> Result<Placed, Refusal>,
+) -> Result<Vec<Placed>, Refusal> {
+    let along = errors.maps().into_iter().map(|map| Ok(along(found, &map)));
+    let bent = errors.bends().into_iter().map(|bend| {
+        let points = found.points.iter().map(|p| bend.without(p)).collect();
+        again(points).map_err(|_| Refusal::PoorlyDetermined)
+    });
+    along.chain(bent).collect()
+}
+
+/// Everything as a linear map of space takes it along.
+fn along(found: &Placed, map: &Matrix3<f64>) -> Placed {
+    let turn = map.try_inverse().unwrap_or_else(Matrix3::identity).transpose();
+    Placed {
+        points: found.points.iter().map(|p| map * p).collect(),
+        normals: found.normals.iter().map(|n| (turn * n).normalize()).collect(),
+        pose: mapped(&found.pose, map),
     }
-    for bend in settings.errors.bends() {
-        let mut cloud = surface.cloud.clone();
-        cloud.points = points.iter().map(|p| bend.without(p)).collect();
-        let normals = normals(&cloud.points, near, workers);
-        let tensors = shape_tensors(&cloud.points, near, &normals, workers);
-        let straight = Surface { cloud, near, normals, tensors };
-        let found = axis_of(view, &straight, settings, workers, &mut Clock::start());
-        let pose = found.map_err(|_| Refusal::PoorlyDetermined)?.pose;
-        add(pose, &straight.cloud.points, &straight.normals);
-    }
-    Ok(sum)
+}
+
+/// The step from one pose to another.
+pub fn step_to(pose: &SiloPose, other: &SiloPose) -> Vector4<f64> {
+    Vector4::new(other.r_x - pose.r_x, other.r_y - pose.r_y, other.t_x - pose.t_x, other.t_y - pose.t_y)
 }
 
 /// The pose whose axis is the image of another one's.
 fn mapped(pose: &SiloPose, map: &Matrix3<f64>) -> SiloPose {
     SiloPose::from_axis(&(map * pose.axis_direction()), &(map * pose.axis_point()))
-}
-
-fn difference(one: &SiloPose, other: &SiloPose) -> Vector4<f64> {
-    Vector4::new(one.r_x - other.r_x, one.r_y - other.r_y, one.t_x - other.t_x, one.t_y - other.t_y)
 }
 
 #[cfg(test)]
@@ -125,7 +119,7 @@ mod tests {
         let straight = SiloPose { r_x: 0.0, r_y: 0.0, t_x: 0.0, t_y: 0.0 };
         let errors = SensorErrors { camera_std: [0.0, 0.0, 0.002, 0.0, 0.0], ..SensorErrors::default() };
         let [map] = errors.maps()[..] else { panic!("one map") };
-        let step = difference(&mapped(&straight, &map), &straight);
+        let step = step_to(&straight, &mapped(&straight, &map));
         assert!((step - Vector4::new(0.0, -0.002, 0.0, 0.0)).norm() < 1e-8, "{step}");
     }
 
@@ -133,7 +127,7 @@ mod tests {
     fn another_scale_moves_the_camera_and_turns_nothing() {
         let errors = SensorErrors { bias_std: [0.0, 0.02, 0.0], ..SensorErrors::default() };
         let [map] = errors.maps()[..] else { panic!("one map") };
-        let step = difference(&mapped(&POSE, &map), &POSE);
+        let step = step_to(&POSE, &mapped(&POSE, &map));
         assert!((step - Vector4::new(0.0, 0.0, 0.01, -0.002)).norm() < 1e-12, "{step}");
     }
 

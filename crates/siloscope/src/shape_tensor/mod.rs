@@ -20,7 +20,7 @@ use crate::shape_tensor::candidates::{Candidate, select_candidates};
 use crate::shape_tensor::covariance::Scatter;
 use crate::shape_tensor::coverage::{Coverage, coverage};
 use crate::shape_tensor::diagnostics::{Evidence, PlacedWall, placed_walls};
-use crate::shape_tensor::instrument::SensorErrors;
+use crate::shape_tensor::instrument::{Placed, SensorErrors, step_to, without_each};
 use crate::shape_tensor::profile::{Profile, fit_profile};
 use crate::shape_tensor::tensors::{ShapeTensor, shape_tensors};
 use crate::stats::blocks::blocks;
@@ -141,9 +141,36 @@ fn located_from(view: View, surface: &Surface, settings: &Settings, workers: &Wo
     let found = axis_of(view, surface, settings, workers, clock);
     let located = assess(surface, &found?, settings, workers);
     clock.lap("evidence");
-    let located = instrument::with_errors(located?, (surface, view), settings, workers);
+    let located = with_sensor_errors(located?, (surface, view), settings, workers);
     clock.lap("sensor");
     located
+}
+
+/// The answer with the share of the sensor's and the camera's errors in its covariances.
+fn with_sensor_errors(
+    located: Located,
+    (surface, view): (&Surface, View),
+    settings: &Settings,
+    workers: &Workers,
+) -> Outcome {
+    let again = |points: Vec<Vec3>| {
+        let normals = normals(&points, surface.near, workers);
+        let tensors = shape_tensors(&points, surface.near, &normals, workers);
+        let mut cloud = surface.cloud.clone();
+        cloud.points = points;
+        let surface = Surface { cloud, near: surface.near, normals, tensors };
+        let pose = axis_of(view, &surface, settings, workers, &mut Clock::start())?.pose;
+        Ok(Placed { points: surface.cloud.points, normals: surface.normals, pose })
+    };
+    let found = Placed { points: surface.cloud.points.clone(), normals: surface.normals.clone(), pose: located.pose };
+    let mut sum = located.clone();
+    for other in without_each(&settings.errors, &found, again)? {
+        let step = step_to(&located.pose, &other.pose);
+        sum.covariance += step * step.transpose();
+        let profile = fit_profile(&other.points, &other.normals, &other.pose, settings.block());
+        sum.profile.add_step(&located.profile, &profile);
+    }
+    Ok(sum)
 }
 
 /// Steps 3 to 6.
