@@ -53,13 +53,18 @@ def told_by(capsys: Any, *words: Any, url: str | None = None) -> Any:
     return json.loads(capsys.readouterr().out)
 
 
+def _kinds(server: Server) -> list[str]:
+    return [event["kind"] for event in server.get("/api/v1/silos/silo7/events").json["items"]]
+
+
 def test_a_run_comes_back_as_a_run_and_keeps_the_old_readings(
     monitor: tuple[Server, Any], tmp_path: Path, capsys: Any
 ) -> None:
     server, url = monitor
     client = Client(server.root)
     before = list(client.readings("silo7"))
-    events = server.get("/api/v1/silos/silo7/events").json["items"]
+    # the story is told a moment after the readings it is of
+    kinds = eventually(lambda: _kinds(server))
     store, run = tmp_path / "store", tmp_path / "run"
     packed = told_by(capsys, "pack", "--monitor", server.data, "-o", store, url=url)
     assert (packed["frames"], packed["series"], packed["problems"]) == (5, {"silo7.cam7": 5}, [])
@@ -87,8 +92,8 @@ def test_a_run_comes_back_as_a_run_and_keeps_the_old_readings(
     assert [(runs[key]["current"], runs[key]["replaced"]) for key in (told["monitor_run"], first)] == [(5, 0), (0, 5)]
     assert server.get("/api/v1/silos/silo7/now").json["reading"] == after[-1]["id"]
     assert server.get("/api/v1/silos/silo7/surface").json["reading"] == before[-1]["id"]
-    later = server.get("/api/v1/silos/silo7/events").json["items"]
-    assert [event["kind"] for event in later] == [event["kind"] for event in events]
+    assert kinds == ["withdrawal"]
+    assert eventually(lambda: _kinds(server) == kinds)
 
     again = told_by(capsys, "fleet", "publish", run, "--monitor", server.data, url=url)
     assert (again["added"], again["again"], again["monitor_run"]) == (0, 5, told["monitor_run"])
