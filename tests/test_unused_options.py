@@ -54,7 +54,7 @@ def test_a_diameter_without_a_cylinder_in_view() -> None:
     assert unused(siloscope.locate(cone, CAMERA, **known)) == []
 
 
-def test_the_six_steps_take_nothing_as_known() -> None:
+def test_the_six_steps_take_a_sensor_for_their_deviations_alone() -> None:
     settings: dict[str, Any] = {
         "sensor": "orbbec-astra-s",
         "diameter": 2.0,
@@ -63,5 +63,13 @@ def test_the_six_steps_take_nothing_as_known() -> None:
         "grid": 0.05,
     }
     told = siloscope.locate(DEPTH, CAMERA, method="shape-tensor", **settings)
-    assert unused(told) == ["sensor", "diameter", "gravity", "intrinsics"]
-    assert unused(siloscope.locate(DEPTH, CAMERA, method="shape-tensor")) == []
+    assert unused(told) == ["diameter", "gravity"]
+    plain = siloscope.locate(DEPTH, CAMERA, method="shape-tensor", grid=0.05)
+    assert unused(plain) == []
+    for option in ("sensor", "intrinsics"):
+        alone = siloscope.locate(DEPTH, CAMERA, method="shape-tensor", grid=0.05, **{option: settings[option]})
+        assert alone.pose == plain.pose
+        assert not np.allclose(alone.covariance, plain.covariance, rtol=0.01, atol=0.0)
+    drawn = np.random.default_rng(0).permutation(POINTS.reshape(-1, 3))
+    cloud = siloscope.locate(drawn, method="shape-tensor", **settings)
+    assert unused(cloud) == ["sensor", "diameter", "gravity", "intrinsics"]

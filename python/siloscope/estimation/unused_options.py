@@ -14,22 +14,24 @@ from siloscope.types.remark import Remark
 def unused_options(estimate: Estimate, prepared: Prepared, settings: Settings) -> Iterator[Remark]:
     """A note for each option that was given and did not act."""
     six_steps = estimate.method == "shape-tensor"
-    told = [*(_by_the_six_steps(settings) if six_steps else _by_the_fit(prepared, settings))]
+    told = [*(_by_the_six_steps(prepared, settings) if six_steps else _by_the_fit(prepared, settings))]
     if not six_steps and estimate.ok and estimate.silo.radius is None and settings.diameter is not None:
         told.append(("diameter", "no cylinder is in view"))
     for option, why in told:
         yield Remark("option-unused", f"{option}: {why}")
 
 
-def _by_the_six_steps(settings: Settings) -> Iterator[tuple[str, str]]:
+def _by_the_six_steps(prepared: Prepared, settings: Settings) -> Iterator[tuple[str, str]]:
+    """Sensor and intrinsics act on the deviations of an image's answer; of a cloud no errors are known."""
     why = "the method shape-tensor takes nothing as known"
-    if settings.profile != UNKNOWN:
+    cloud = isinstance(prepared, PreparedPoints)
+    if cloud and settings.profile != UNKNOWN:
         yield "sensor", why
     if settings.diameter is not None:
         yield "diameter", why
     if settings.gravity_given:
         yield "gravity", why
-    if settings.intrinsics is not None:
+    if cloud and settings.intrinsics is not None:
         yield "intrinsics", why
 
 

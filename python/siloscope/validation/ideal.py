@@ -27,6 +27,8 @@ SCALE_BY_TAPE = 0.05
 """Where the depth's scale stands, and its deviation where a diameter tells it."""
 
 ROUNDS = 8
+"""Most linearisations."""
+
 LONGEST_TURN = 0.05
 """Longest step of an angle, rad."""
 
@@ -34,7 +36,7 @@ UNDETERMINED = 1e-12
 """Eigenvalues of the scaled equations below this are rounding."""
 
 SMALL = 1e-5
-"""Most linearisations; a step of the pose so small (rad, m) is the last."""
+"""A step of the pose so small (rad, m) is the last."""
 
 
 @dataclass(frozen=True, eq=False)
