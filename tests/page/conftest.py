@@ -36,6 +36,9 @@ PHONE, DESK = {"width": 390, "height": 844}, {"width": 1280, "height": 860}
 BREACH = re.compile("CSP |Content.Security.Policy")
 """What the browser writes where the policy is broken."""
 
+DRIVEN = "cam-south-1"
+"""The company drives this camera, of which nothing comes."""
+
 READY_S = 240.0
 """How long the simulated farm may take to be made on a busy machine."""
 
@@ -141,7 +144,7 @@ def company(farm: Running, tmp_path_factory: pytest.TempPathFactory) -> Iterator
     with sqlite3.connect(farm.data / "siloscope.db") as source, sqlite3.connect(data / "siloscope.db") as target:
         source.backup(target)
     shutil.copytree(farm.data / "frames", data / "frames")
-    with serving(data) as running:
+    with serving(data, "--live", f"{DRIVEN}=folder:{data.parent / 'none'}") as running:
         yield running
 
 

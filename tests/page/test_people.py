@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from page.conftest import AXE, DESK, PHONE, Running, grave, visiting
+from page.conftest import AXE, DESK, DRIVEN, PHONE, Running, grave, visiting
 
 PASSWORD = "correct horse battery"
 
@@ -123,3 +123,15 @@ def test_a_person_is_locked_out(chromium: Any, company: Running, admin: Any) -> 
         page = visit.open("#/settings")
         page.get_by_role("button", name="Lock out Former").click()
         page.get_by_role("listitem").filter(has_text="Former").get_by_text("locked out").wait_for()
+
+
+def test_a_camera_that_the_service_drives_says_why_it_gives_nothing(
+    chromium: Any, company: Running, admin: Any
+) -> None:
+    with signed_in(chromium, company, admin) as visit:
+        row = visit.open("#/cameras").get_by_role("listitem").filter(has_text=DRIVEN)
+        row.get_by_text("gives no frames").wait_for()
+        assert "No such file or directory" in row.inner_text()
+        page = visit.open(f"#/install/{DRIVEN}")
+        page.get_by_text("No such file or directory").wait_for()
+        assert visit.errors == []

@@ -15,11 +15,9 @@ from siloscope.cli.outcome import PARTIAL, print_json
 from siloscope.cli.progress import say
 from siloscope.client import Client, ServiceError
 from siloscope.errors import InputError, UsageError
+from siloscope.io.watched import WatchedFolder, files_in
 from siloscope.tracking.clock import time_in_name
 from siloscope.wording import counted
-
-QUIET_S = 2.0
-"""A file that was written so recently may still be growing."""
 
 FIRST_WAIT_S, LAST_WAIT_S = 1.0, 60.0
 """Waits between tries double from the first to the last."""
@@ -71,28 +69,20 @@ def _token(file: Path | None) -> str | None:
 def _files(paths: list[Path]) -> Iterator[Path]:
     for path in paths:
         if path.is_dir():
-            yield from _in(path)
+            yield from files_in(path)
         elif path.is_file():
             yield path
         else:
             raise InputError(f"{path}: no such file; check the path")
 
 
-def _in(folder: Path) -> list[Path]:
-    """Files of a folder, the oldest first; names with a dot before them are not finished."""
-    return sorted((p for p in folder.iterdir() if p.is_file() and p.name[0] != "."), key=lambda p: p.stat().st_mtime)
-
-
 def _watched(folder: Path) -> Iterator[Path]:
     """Files as they come and are complete, each once."""
-    done: dict[Path, int] = {}
+    watched = WatchedFolder(folder)
     while True:
-        for path in _in(folder):
-            changed = path.stat().st_mtime_ns
-            if done.get(path) != changed and time.time() - changed / 1e9 > QUIET_S:
-                done[path] = changed
-                yield path
-        done = {path: changed for path, changed in done.items() if path.exists()}
+        for path in watched.complete():
+            watched.give(path)
+            yield path
         time.sleep(1.0)
 
 

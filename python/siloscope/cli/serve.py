@@ -38,6 +38,10 @@ def serve(
     workers: Annotated[
         int, typer.Option(min=0, max=64, help="Measuring processes; 0 leaves it to another service of the database.")
     ] = 1,
+    live: Annotated[
+        list[str] | None,
+        typer.Option("--live", metavar="CAMERA=SOURCE", help="Drive a camera: realsense, folder:PATH, command:WORDS …"),
+    ] = None,
     demo: Annotated[bool, typer.Option("--demo", help="A simulated farm, with two years of history.")] = False,
     as_json: options.AsJson = False,
 ) -> int:
@@ -52,21 +56,27 @@ def serve(
     host, port = address(bind)
     if data is None and not demo:
         raise UsageError("say where the data lie with --data DIR, or look at a simulated farm with --demo")
-    if data is not None:
-        return _run(_settings(data, site, host, port, database, workers), demo, as_json)
-    with TemporaryDirectory(prefix="siloscope-demo-") as folder:
-        return _run(_settings(Path(folder), site, host, port, database, workers), demo, as_json)
-
-
-def _settings(data: Path, site: Path | None, host: str, port: int, database: str | None, workers: int) -> Settings:
     from siloscope.monitor.settings import Settings
 
-    return Settings(data, database, site, host, port, workers)
+    driven = tuple(_driven(text) for text in live or ())
+    if data is not None:
+        return _run(Settings(data, database, site, host, port, workers, driven), demo, as_json)
+    with TemporaryDirectory(prefix="siloscope-demo-") as folder:
+        return _run(Settings(Path(folder), database, site, host, port, workers, driven), demo, as_json)
+
+
+def _driven(text: str) -> tuple[str, str]:
+    """Camera and source of ``CAMERA=SOURCE``; raises `UsageError`."""
+    camera, equals, source = text.partition("=")
+    if not (camera and equals and source):
+        raise UsageError(f"--live '{text}': give a camera and its source, such as cam7=realsense")
+    return camera, source
 
 
 def _run(settings: Settings, demo: bool, as_json: bool) -> int:
     from siloscope.monitor import server
     from siloscope.monitor.access import first_link
+    from siloscope.monitor.live.attach import attach as drive
     from siloscope.monitor.publish.attach import attach
     from siloscope.monitor.service import Service
 
@@ -82,6 +92,7 @@ def _run(settings: Settings, demo: bool, as_json: bool) -> int:
             "make one with `siloscope monitor user NAME`, or start with --bind 127.0.0.1:8480 and use the link"
         )
     attach(service)
+    drive(service)
     sock = server.listening(settings.host, settings.port)
     root = f"http://{_shown(settings.host)}:{sock.getsockname()[1]}"
     if as_json:

@@ -5,12 +5,14 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Protocol
 
 from sqlalchemy.exc import OperationalError
 
 from siloscope import _core
 from siloscope.monitor import site
+from siloscope.monitor.aiming import Aiming
 from siloscope.monitor.alerts import Alerting, add_defaults
 from siloscope.monitor.blobs import Blobs
 from siloscope.monitor.calibrating import Calibrating
@@ -91,6 +93,9 @@ class Service:
         self.parts: list[Part] = []
         """What else runs, such as the publishers."""
         self.outlets = Outlets()
+        self.live: dict[str, tuple[str, Path]] = {}
+        """Cameras that the service drives: their source, and the folder where its paths begin."""
+        self.aiming = Aiming()
         self.listeners: list[Callable[[], None]] = []
         """Called when something changed, from any thread."""
         self.started = self.clock.now()
@@ -107,6 +112,8 @@ class Service:
                 found = site.read(self.settings.site)
                 site.apply(connection, found, self.settings.site, now)
                 self.outlets = found
+                self.live = found.live(self.settings.site.parent)
+        self.live |= {camera: (source, Path()) for camera, source in self.settings.live}
         self.lock.share()
         return swept
 

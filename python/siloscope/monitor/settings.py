@@ -60,6 +60,8 @@ class Settings:
     host: str = HOST
     port: int = PORT
     workers: int = 1
+    live: tuple[tuple[str, str], ...] = ()
+    """Cameras that the service drives beside those of SITE.toml, and their sources."""
     idle_s: float = 300.0
     """A worker without a frame for so long ends, and starts again with the next."""
     tick: int = MINUTE

@@ -102,6 +102,8 @@ class CameraEntry(StrictDocument):
     depth_unit: Number | None = None
     expected_s: Index | None = None
     """Seconds between frames."""
+    live: str | None = None
+    """Where the service takes its frames itself; see `siloscope.monitor.live.attach`."""
 
 
 class ProductEntry(StrictDocument):
@@ -143,6 +145,10 @@ class SiteFile(Outlets):
     camera: list[CameraEntry] = Field(default_factory=list)
     product: list[ProductEntry] = Field(default_factory=list)
     rule: list[RuleEntry] = Field(default_factory=list)
+
+    def live(self, folder: Path) -> dict[str, tuple[str, Path]]:
+        """Sources of the cameras that the service drives, whose paths begin at `folder`."""
+        return {entry.id: (entry.live, folder.absolute()) for entry in self.camera if entry.live is not None}
 
 
 def read(path: Path) -> SiteFile:

@@ -86,6 +86,8 @@ export interface Camera {
   has_intrinsics: boolean;
   version: number;
   state: CameraState;
+  /** Null where the camera sends its frames. */
+  live: Live | null;
 }
 
 /** What is to change of a camera; what is left out stays. */
@@ -306,6 +308,16 @@ export interface Level {
   at_axis: number | null;
   /** Standard deviation of the mean. */
   std: number | null;
+}
+
+/** A camera that the service drives itself. */
+export interface Live {
+  /** realsense, orbbec, folder, inbox, command. */
+  source: string;
+  state: "starting" | "ok" | "failing";
+  /** Why it gives no frames, in English. */
+  problem: string | null;
+  since: string;
 }
 
 /** A role to be given; it takes the place of one on the same place. */

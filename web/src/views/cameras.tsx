@@ -34,10 +34,19 @@ export function Cameras() {
   );
 }
 
+/** Why a camera that the service drives gives no frames: what its driver or command said, in English. */
+export const Failing = ({ live }: { live: Camera["live"] }) =>
+  live?.problem ? (
+    <p class="note bad" lang="en">
+      {live.problem}
+    </p>
+  ) : null;
+
 function CameraText({ camera, silo }: { camera: Camera; silo: string }) {
   const { t, named, locale } = useWords();
   const now = useNow();
   const { last_captured, last_state, moved_since, proposed_calibration } = camera.state;
+  const { live } = camera;
   return (
     <div>
       <h2>
@@ -51,7 +60,9 @@ function CameraText({ camera, silo }: { camera: Camera; silo: string }) {
         {last_state && last_state !== "measured" && <span class="badge">{named("frame", last_state)}</span>}
         {moved_since && <span class="badge bad">{named("alert", "camera-moved")}</span>}
         {proposed_calibration && <span class="badge warn">{t("calibration.waiting")}</span>}
+        {live && <span class={`badge${live.state === "failing" ? " bad" : ""}`}>{named("live", live.state)}</span>}
       </p>
+      <Failing live={live} />
     </div>
   );
 }

@@ -1,6 +1,6 @@
 /** The installer's view: how the camera hangs now and which way to turn it, to be read from a ladder. */
 import { useNow } from "../context.ts";
-import type { Pose as Answer } from "../data/answers.ts";
+import type { Pose as Answer, Camera, PageOf } from "../data/answers.ts";
 import { api } from "../data/client.ts";
 import { useResource } from "../data/resources.ts";
 import { age } from "../format/dates.ts";
@@ -9,14 +9,17 @@ import { useWords } from "../i18n/index.ts";
 import { aimOf, GOOD, turns } from "../parts/aim.ts";
 import { Waiting } from "../parts/waiting.tsx";
 import { link } from "../router.ts";
+import { Failing } from "./cameras.tsx";
 
 export function Install({ camera }: { camera: string }) {
   const { t, named, locale, language } = useWords();
   const now = useNow();
   const path = `cameras/${encodeURIComponent(camera)}/pose`;
   const found = useResource<Answer>(path, "frame", "reading", "camera", "calibration");
+  const cameras = useResource<PageOf<Camera>>("cameras", "camera", "frame", "calibration");
   if (!found.data) return <Waiting resource={found} />;
   const { data } = found;
+  const live = cameras.data?.items.find((one) => one.id === camera)?.live ?? null;
   return (
     <main id="main" class="install" tabIndex={-1}>
       <div class="row apart">
@@ -34,6 +37,7 @@ export function Install({ camera }: { camera: string }) {
           <p class="hint">{data.frame === null ? t("install.waiting") : named("reason", data.reason ?? "refused")}</p>
         )}
       </div>
+      <Failing live={live} />
       {data.message && language === "en" && <p class="note warn">{data.message}</p>}
       {data.frame !== null && (
         <img class="picture" src={api(`frames/${encodeURIComponent(data.frame)}/picture`)} alt={t("install.picture")} />

@@ -11,7 +11,7 @@ from siloscope.monitor.api import models, views
 from siloscope.monitor.api.context import PersonOf, Reading, ServiceOf, refusals
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.publish import metrics
-from siloscope.monitor.store import changes, frames, people, places
+from siloscope.monitor.store import changes, frames, live, people, places
 
 router = APIRouter(tags=["service"])
 outside = APIRouter(tags=["service"])
@@ -29,9 +29,10 @@ def readyz(service: ServiceOf) -> JSONResponse:
     free, _ = service.blobs.free()
     try:
         with service.store.read() as connection:
-            waiting = frames.waiting(connection)
+            waiting, driven = frames.waiting(connection), live.states(connection).values()
         detail: dict[str, str | int | float | bool | None] = {"frames_waiting": waiting, "disk_free_bytes": free}
-        detail["leads"] = service.leads
+        detail |= {"leads": service.leads, "live_cameras": len(driven)}
+        detail["live_failing"] = sum(one["state"] == live.FAILING for one in driven)
         ready = service.has_room() and waiting < service.settings.limits.queue
     except SQLAlchemyError as error:
         detail, ready = {"database": type(error).__name__}, False

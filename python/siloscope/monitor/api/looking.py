@@ -46,6 +46,7 @@ def get_pose(camera: str, person: PersonOf, service: ServiceOf) -> models.Pose:
             raise Problem("not-found", f"there is no camera '{camera}'")
         newest = frames.newest(connection, camera)
         row = None if newest is None else frames.get(connection, newest.id)
+    service.aiming.look(camera)
     told = {"camera": camera, "silo": known.silo}
     if row is None:
         return models.Pose(**told)

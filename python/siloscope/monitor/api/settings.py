@@ -17,7 +17,7 @@ from siloscope.monitor.api.context import PersonOf, Reading, ServiceOf, address_
 from siloscope.monitor.api.versions import IfMatch, must_match, tell
 from siloscope.monitor.problems import Problem
 from siloscope.monitor.service import Service
-from siloscope.monitor.store import people, places
+from siloscope.monitor.store import live, people, places
 
 router = APIRouter(tags=["settings"])
 
@@ -125,7 +125,9 @@ def _product(row: Any) -> models.Product:
 
 def _camera(connection: Connection, row: Any) -> models.Camera:
     told = {name: getattr(row, name) for name in ("id", "silo", "sensor", "depth_unit", "expected_s", "version")}
-    return models.Camera(**told, has_intrinsics=bool(row.intrinsics), state=views.camera_state(connection, row))
+    state, driven = views.camera_state(connection, row), live.states(connection).get(row.id)
+    told_live = None if driven is None else models.Live(**{**driven, "since": views.at(driven["since"])})
+    return models.Camera(**told, has_intrinsics=bool(row.intrinsics), state=state, live=told_live)
 
 
 @router.get("/places", response_model=models.Page[models.Place], responses=refusals())

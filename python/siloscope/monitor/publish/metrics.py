@@ -12,7 +12,7 @@ from sqlalchemy import Connection
 from siloscope import _core
 from siloscope.monitor.clock import SECOND
 from siloscope.monitor.service import Service
-from siloscope.monitor.store import alerts, deliveries, frames, places, readings, sync
+from siloscope.monitor.store import alerts, deliveries, frames, live, places, readings, sync
 
 CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
@@ -85,6 +85,12 @@ class Collector:
         for row in alerts.firing(connection):
             firing.add_metric([row.silo, row.kind], row.number)
         yield firing
+        up = GaugeMetricFamily(
+            "siloscope_live_camera_up", "1 while a camera that is driven gives frames.", labels=["camera"]
+        )
+        for camera, state in live.states(connection).items():
+            up.add_metric([camera], float(state["state"] == live.OK))
+        yield up
 
     def _process(self) -> Iterator[Metric]:
         measuring, (free, _) = self._service.measuring, self._service.blobs.free()

@@ -9,6 +9,7 @@ import multiprocessing
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager
 from dataclasses import replace
+from functools import partial
 from multiprocessing.connection import Connection
 from types import TracebackType
 from typing import Protocol, Self
@@ -40,16 +41,21 @@ OpenSensor = Callable[[], AbstractContextManager[Sensor]]
 """Starts a camera; it is called in the camera's own process and so has to be importable."""
 
 
-def sensor(name: str) -> OpenSensor:
-    """The way to start a camera by the maker's name, ``realsense`` or ``orbbec``; raises `UsageError` for others."""
+def sensor(name: str, serial: str | None = None) -> OpenSensor:
+    """The way to start a camera by the maker's name, ``realsense`` or ``orbbec``; of several by its serial number.
+
+    Raises `UsageError` for other makers, and for a serial number of an Orbbec camera.
+    """
     if name == "realsense":
         from siloscope.sensors.live.realsense import open_first as realsense
 
-        return realsense
-    if name == "orbbec":
+        return realsense if serial is None else partial(realsense, serial)
+    if name == "orbbec" and serial is None:
         from siloscope.sensors.live.orbbec import open_first as orbbec
 
         return orbbec
+    if name == "orbbec":
+        raise UsageError(f"orbbec:{serial}: an Orbbec camera is not chosen by a serial number; connect one, say orbbec")
     raise UsageError(f"unknown kind of camera '{name}'; known are realsense and orbbec")
 
 

@@ -133,10 +133,16 @@ def _info(device: Any, key: Any) -> str:
     return str(device.get_info(key)) if device.supports(key) else "RealSense"
 
 
-def open_first() -> RealSense:
-    """The first camera connected; raises `InputError` where there is none, or the SDK is missing."""
+def open_first(serial: str | None = None) -> RealSense:
+    """The first camera connected, or the one of a serial number.
+
+    Raises `InputError` where there is none, or the SDK is missing.
+    """
     rs = need("pyrealsense2", "realsense", "a live RealSense camera")
-    devices = list(rs.context().query_devices())
+    devices = [
+        one for one in rs.context().query_devices() if serial in (None, _info(one, rs.camera_info.serial_number))
+    ]
     if not devices:
-        raise InputError("no RealSense camera is connected; plug it into a USB 3 socket")
+        which = "" if serial is None else f" with the serial number {serial}"
+        raise InputError(f"no RealSense camera{which} is connected; plug it into a USB 3 socket")
     return RealSense(devices[0], rs)

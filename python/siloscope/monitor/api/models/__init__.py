@@ -53,7 +53,18 @@ from siloscope.monitor.api.models.settings import (
     Ticket,
     VesselChange,
 )
-from siloscope.monitor.api.models.things import Calibration, Camera, Change, Health, Place, Product, Run, Silo, Site
+from siloscope.monitor.api.models.things import (
+    Calibration,
+    Camera,
+    Change,
+    Health,
+    Live,
+    Place,
+    Product,
+    Run,
+    Silo,
+    Site,
+)
 
 __all__ = [
     "Acknowledgement",
@@ -83,6 +94,7 @@ __all__ = [
     "Invitation",
     "Item",
     "Level",
+    "Live",
     "Model",
     "NewGrant",
     "NewTicket",

@@ -22,6 +22,15 @@ class Place(Model):
     version: int
 
 
+class Live(Model):
+    """A camera that the service drives itself."""
+
+    source: str = Field(description="realsense, orbbec, folder, inbox, command.")
+    state: Literal["starting", "ok", "failing"]
+    problem: str | None = Field(description="Why it gives no frames, in English.")
+    since: datetime
+
+
 class Camera(Model):
     """A camera and what is known of it."""
 
@@ -33,6 +42,7 @@ class Camera(Model):
     has_intrinsics: bool
     version: int
     state: CameraState
+    live: Live | None = Field(description="Null where the camera sends its frames.")
 
 
 class Product(Model):
