@@ -207,6 +207,12 @@ PLACES = {"r_x": 0, "radius": 12, "cone_slope": 49, "cone_intercept": 50}
 """Where the state of the evidence has some parameters."""
 
 
+def with_evidence(frame: Estimate, evidence: FrameFactor) -> Estimate:
+    """A frame's answer that says something else."""
+    assert frame.details is not None
+    return replace(frame, details=replace(frame.details, evidence=evidence))
+
+
 def shifted(evidence: FrameFactor, by: dict[int, float]) -> FrameFactor:
     """What a frame would say if its answer were another one."""
     state = evidence.state.copy()
@@ -225,7 +231,7 @@ def test_a_bad_frame_beside_a_move_is_on_the_side_of_its_own_pose(bad: int, wron
     side = before if bad < 0 else after
     frame = side[bad]
     assert frame.evidence is not None
-    side[bad] = replace(frame, evidence=shifted(frame.evidence, {PLACES[wrong]: 2e-3}))
+    side[bad] = with_evidence(frame, shifted(frame.evidence, {PLACES[wrong]: 2e-3}))
     found = calibrate([*before, *after])
     assert [move.index for move in found.moves] == [len(before)]
 
@@ -273,7 +279,7 @@ def _shaken(frame: Estimate, number: int) -> Estimate:
     assert evidence is not None
     assert frame.covariance is not None
     steps = np.random.default_rng(number).normal(0.0, 8.0, 4) * np.sqrt(np.diag(frame.covariance))
-    return replace(frame, evidence=shifted(evidence, dict(enumerate(steps))))
+    return with_evidence(frame, shifted(evidence, dict(enumerate(steps))))
 
 
 def test_the_papers_rule_is_the_mean_of_the_last_ten() -> None:
@@ -303,7 +309,7 @@ def test_a_wrong_cone_is_left_out_and_its_frame_is_not() -> None:
     assert all(one.silo.apex is None for one in cylinder)
     assert wrong.evidence is not None
     off = {PLACES["cone_slope"]: 0.05, PLACES["cone_intercept"]: 0.05}
-    wrong = replace(wrong, evidence=shifted(wrong.evidence, off))
+    wrong = with_evidence(wrong, shifted(wrong.evidence, off))
     found = calibrate([*cylinder, wrong, *cones])
     assert [record.status for record in found.frames] == ["used"] * (len(cylinder) + 3)
     assert found.silo.apex is not None
@@ -366,7 +372,7 @@ def test_frames_of_other_silos_disagree_and_vague_ones_leave_the_axis_open() -> 
         replace(share, information=1e-7 * share.information, gradient=1e-7 * share.gradient)
         for share in sharp.evidence.shares
     )
-    vague = replace(sharp, evidence=replace(sharp.evidence, shares=faint))
+    vague = with_evidence(sharp, replace(sharp.evidence, shares=faint))
     assert calibrate([vague] * 3).reason == "poorly-determined"
 
 
@@ -392,7 +398,7 @@ def test_wrong_settings_are_told() -> None:
         calibrate([*sequence(), located(SILO, "realsense-d435"), located(SILO, None)])
     with pytest.raises(UsageError, match="another diameter"):
         calibrate(sequence(), diameter=2.0, continue_from=calibrate(sequence()))
-    bare = [replace(frame, evidence=None) for frame in sequence()]
+    bare = [replace(frame, details=None) for frame in sequence()]
     with pytest.raises(UsageError, match="mean-of-last-10"):
         calibrate(bare)
 

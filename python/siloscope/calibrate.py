@@ -66,7 +66,8 @@ def calibrate(
     Parameters
     ----------
     frames : files, frame source, or iterable of Frame, depth array or Estimate
-        A path or several, what `siloscope.open` gives, frames, arrays, or answers of `locate` (method surface).
+        A path or several, what `siloscope.open` gives, frames, arrays, or answers of `locate` (method surface) with
+        their details.
     camera, sensor, depth_unit, diameter, gravity
         As for `locate`. Estimates bring their own.
     bottom : str, optional

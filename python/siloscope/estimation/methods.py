@@ -15,7 +15,7 @@ from siloscope.estimation.inputs import Prepared, PreparedPoints
 from siloscope.estimation.priors import CLOUD, Priors
 from siloscope.estimation.settings import Settings
 from siloscope.sensors import UNKNOWN, SensorProfile
-from siloscope.types.estimate import Estimate, SurfaceDetails
+from siloscope.types.estimate import Estimate
 
 FEW_TILES = ("no-wall", "no-depth", "direction-unknown", "position-unknown", "poorly-determined")
 """Refusals of a cloud's image whose points may still show a wall: the image of a small thing has few tiles."""
@@ -64,7 +64,7 @@ def _unbiased(points: NDArray[np.float64], profile: SensorProfile) -> NDArray[np
 def _of_a_cloud(estimate: Estimate) -> Estimate:
     """An answer by a cloud's image, without what only an image's pixels have."""
     found = estimate.details
-    return estimate if found is None else replace(estimate, details=SurfaceDetails(found.points, found.residuals))
+    return estimate if found is None else replace(estimate, details=replace(found, wall=None, pixel_labels=None))
 
 
 def _shape_tensor(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:

@@ -121,8 +121,7 @@ def _estimate(
         config=config or {},
         timing_ms=timing_ms(fit.stages),
         extra=extra,
-        evidence=FrameFactor.of(fit.factor),
-        details=SurfaceDetails(fit.points, fit.residuals, fit.warm_start, labels),
+        details=SurfaceDetails(fit.points, fit.residuals, fit.warm_start, labels, FrameFactor.of(fit.factor)),
     )
 
 

@@ -43,7 +43,7 @@ class History:
         errors = [answer.error for answer in answers if answer.error is not None]
         if errors and len(errors) == len(answers):
             raise errors[0]
-        new = tuple((n, a.estimate.evidence) for n, a in numbered if a.estimate and a.estimate.evidence)
+        new = tuple((n, a.evidence) for n, a in numbered if a.evidence)
         records = (*self.records, *(_record(n, answer) for n, answer in numbered), *unread)
         return replace(self, records=records, evidence=(*self.evidence, *new))
 
@@ -54,7 +54,7 @@ def _record(number: int, answer: LocatedFrame) -> FrameRecord:
         return replace(plain, status="unreadable", reason=str(answer.error))
     if not answer.estimate.ok:
         return replace(plain, status="refused", reason=answer.estimate.reason)
-    return replace(plain, pose=answer.estimate.pose, cone_reach=answer.cone_reach or answer.estimate.cone_reach)
+    return replace(plain, pose=answer.estimate.pose, cone_reach=answer.cone_reach)
 
 
 MAX_KEPT_FACTORS = 100

@@ -44,7 +44,8 @@ def calibration_of(history: History, rule: str, config: dict[str, Any]) -> Calib
         return _mean_of_last(history, config)
     if not history.evidence:
         raise UsageError(
-            "fusing by information needs estimates of method surface; give those, or choose the rule mean-of-last-10"
+            "fusing by information needs estimates of method surface, with their details; give those, or choose the "
+            "rule mean-of-last-10"
         )
     fused = since_the_last_move(history)
     if fused is None:

@@ -44,7 +44,7 @@ class FrameLocator:
     def __call__(self, number: int, frame: Any, start: Estimate | None) -> Located:
         """The answer of the frame of a number, looked for first where `start` has the wall."""
         if isinstance(frame, Estimate):
-            return LocatedFrame(f"estimate {number}", None, frame, made=False), None
+            return _kept(f"estimate {number}", None, frame, made=False), None
         name = frame.source if isinstance(frame, Frame) else f"frame {number}"
         timestamp = frame.timestamp if isinstance(frame, Frame) else None
         try:
@@ -52,8 +52,7 @@ class FrameLocator:
         except InputError as error:
             return LocatedFrame(name, timestamp, None, error), None
         camera = self.camera or (frame.camera if isinstance(frame, Frame) else None)
-        bare = replace(estimate, details=None)
-        return LocatedFrame(name, timestamp, bare, camera=camera, cone_reach=estimate.cone_reach), estimate
+        return _kept(name, timestamp, estimate, camera=camera), estimate
 
     def _estimate(self, number: int, frame: Any, start: Estimate | None) -> Estimate:
         common, unit = self.settings, self.depth_unit
@@ -71,6 +70,14 @@ class FrameLocator:
         except InputError:  # all the pixels tell better what is wrong
             return None
         return estimate if estimate is not None and estimate.ok else None
+
+
+def _kept(
+    name: str, timestamp: float | None, estimate: Estimate, camera: Camera | None = None, made: bool = True
+) -> LocatedFrame:
+    """What a calibration keeps of an estimate."""
+    bare = replace(estimate, details=None)
+    return LocatedFrame(name, timestamp, bare, None, camera, estimate.evidence, estimate.cone_reach, made=made)
 
 
 def located(frames: Iterable[Any], one: FrameLocator, pool: Executor | Inline, ahead: int) -> Iterator[LocatedFrame]:

@@ -14,7 +14,7 @@ from siloscope.reproduction.solvers import ALL, KNOWN
 from siloscope.schema.frame_factor import Factor
 from siloscope.sensors import SensorProfile
 from siloscope.simulation import Scene, SimulatedFrame, metrics
-from siloscope.types.estimate import Estimate, Ratios
+from siloscope.types.estimate import Estimate, Ratios, SurfaceDetails
 from siloscope.types.frame_factor import FrameFactor
 from siloscope.types.pose import SiloPose
 from siloscope.types.vessel import SiloGeometry
@@ -126,7 +126,7 @@ class Answer:
             covariance=self.covariance,
             silo=self.silo,
             reason=self.reason,
-            evidence=self.evidence,
+            details=SurfaceDetails(np.empty((0, 3)), np.empty(0), evidence=self.evidence),
         )
 
 

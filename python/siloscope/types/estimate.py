@@ -63,7 +63,7 @@ class PixelLabels:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class SurfaceDetails(ByValue):
-    """What pictures show of a fit.
+    """What pictures show of a fit, and what other frames take from it.
 
     `points` (N, 3): patches in the silo frame, m; `residuals` (N,): their distance from the wall, m, NaN where a patch
     is not wall.
@@ -75,6 +75,8 @@ class SurfaceDetails(ByValue):
     """Where the frame's patches show the wall, for other frames of the camera to start from; None for clouds."""
     pixel_labels: PixelLabels | None = field(default=None, repr=False)
     """None for clouds."""
+    evidence: FrameFactor | None = None
+    """What the frame says about every parameter: what `calibrate` fuses."""
 
     @property
     def labels(self) -> NDArray[np.uint8] | None:
@@ -114,10 +116,13 @@ class Estimate(ByValue):
     """Milliseconds by stage; no part of the answer, so it is not compared."""
     extra: dict[str, Any] = field(default_factory=dict)
     """Further keys of the JSON document, such as the gravity check."""
-    evidence: FrameFactor | None = None
-    """What the frame says about every parameter, for fusing frames (method ``surface``)."""
     details: SurfaceDetails | None = None
-    """Patches, residuals and labels, for pictures (method ``surface``)."""
+    """Patches, residuals and labels for pictures, and evidence for fusing frames (method ``surface``)."""
+
+    @property
+    def evidence(self) -> FrameFactor | None:
+        """What the frame says about every parameter, for fusing frames; None without details."""
+        return None if self.details is None else self.details.evidence
 
     @property
     def cone_reach(self) -> tuple[float, float] | None:
