@@ -75,6 +75,28 @@ def test_tables_have_all_readings_with_their_deviations(shared: Server) -> None:
     assert sum(bucket["count"] for bucket in trend["items"]) == sum(row["status"] == "ok" for row in rows)
 
 
+def test_a_ticket_is_taken_back_once_and_only_from_its_silo(shared: Server) -> None:
+    made = shared.send(
+        "POST", "/api/v1/silos/silo7/tickets", {"time": "2026-11-01T06:00:00Z", "mass_kg": 6250, "number": "W-1"}
+    )
+    path = f"tickets/{made.json['id']}"
+    admin = shared.token("admin")
+    shared.send("PUT", "/api/v1/silos/elsewhere", {"name": "Elsewhere"}, admin)
+    assert problem(shared.ask("DELETE", f"/api/v1/silos/elsewhere/{path}")) == (404, "not-found")
+    assert shared.ask("DELETE", f"/api/v1/silos/silo7/{path}", token=shared.token("read")).status == 403
+    assert shared.ask("DELETE", f"/api/v1/silos/silo7/{path}").status == 204
+    assert shared.get("/api/v1/silos/silo7/tickets").json["items"] == []
+    assert problem(shared.ask("DELETE", f"/api/v1/silos/silo7/{path}")) == (404, "not-found")
+    line = shared.get("/api/v1/audit?count=1", admin).json["items"][0]
+    assert (line["action"], line["detail"]["number"], line["detail"]["mass_kg"]) == ("remove ticket", "W-1", 6250.0)
+
+
+def test_the_usual_products_have_their_densities(shared: Server) -> None:
+    found = {one["name"]: one for one in shared.get("/api/v1/usual-products").json["items"]}
+    assert (found["wheat"]["density_kg_m3"], found["wheat"]["density_std_kg_m3"]) == (775.0, 28.0)
+    assert list(found) == sorted(found)
+
+
 def applied(folder: Path, text: str) -> list[str]:
     path = folder / "SITE.toml"
     path.write_text(text)

@@ -223,3 +223,25 @@ def phone(chromium: Any, farm: Running) -> Iterator[Visit]:
         yield one
         assert one.foreign == []
         assert one.errors == []
+
+
+PASSWORD = "correct horse battery"
+
+
+@pytest.fixture(scope="session")
+def admin(chromium: Any, company: Running) -> Any:
+    """The first user, made by the one-time link; the cookies of the session."""
+    with visiting(chromium, company.root) as visit:
+        visit.page.goto(company.link)
+        page = visit.page
+        page.get_by_label("Name").fill("Anna")
+        page.get_by_label("Password").fill(PASSWORD)
+        page.get_by_role("button", name="Set password").click()
+        page.wait_for_selector(".card")
+        assert visit.errors == []
+        return visit.page.context.storage_state()
+
+
+def signed_in(browser: Any, company: Running, state: Any, **settings: Any) -> Any:
+    """A window of somebody who is signed in."""
+    return visiting(browser, company.root, storage_state=state, **settings)

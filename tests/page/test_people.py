@@ -7,28 +7,7 @@ from typing import Any
 
 import pytest
 
-from page.conftest import AXE, DESK, DRIVEN, PHONE, Running, grave, visiting
-
-PASSWORD = "correct horse battery"
-
-
-@pytest.fixture(scope="module")
-def admin(chromium: Any, company: Running) -> Any:
-    """The first user, made by the one-time link; the cookies of the session."""
-    with visiting(chromium, company.root) as visit:
-        visit.page.goto(company.link)
-        page = visit.page
-        page.get_by_label("Name").fill("Anna")
-        page.get_by_label("Password").fill(PASSWORD)
-        page.get_by_role("button", name="Set password").click()
-        page.wait_for_selector(".card")
-        assert visit.errors == []
-        yield visit.page.context.storage_state()
-
-
-def signed_in(chromium: Any, company: Running, state: Any) -> Any:
-    """A window of somebody who is signed in."""
-    return visiting(chromium, company.root, storage_state=state)
+from page.conftest import AXE, DESK, DRIVEN, PASSWORD, PHONE, Running, grave, signed_in, visiting
 
 
 def test_without_a_login_there_is_only_the_login(chromium: Any, company: Running, admin: Any) -> None:

@@ -10,7 +10,7 @@ export type Route =
   | { view: "welcome"; secret: string }
   | { view: "install"; camera: string };
 
-export const TABS = ["events", "tickets", "calibration", "rules"] as const;
+export const TABS = ["events", "tickets", "calibration", "rules", "settings"] as const;
 export type Tab = (typeof TABS)[number];
 
 export function parse(hash: string): Route {

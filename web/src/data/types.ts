@@ -489,6 +489,12 @@ export interface PageUser {
   next: string | null;
 }
 
+export interface PageUsualProduct {
+  items: UsualProduct[];
+  /** Cursor of what follows; null at the end. Give it as `after`. */
+  next: string | null;
+}
+
 /** A mill, customer, farm, barn. */
 export interface Place {
   id: string;
@@ -797,6 +803,13 @@ export interface User {
   created: string;
   disabled: string | null;
   grants: Grant[];
+}
+
+/** A product of the built-in table, to begin from. */
+export interface UsualProduct {
+  name: string;
+  density_kg_m3: number;
+  density_std_kg_m3: number;
 }
 
 /** What the vessel is drawn from; null where not known. z is down from the camera's height. */

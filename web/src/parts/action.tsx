@@ -6,11 +6,13 @@ import { told } from "./problems.ts";
 
 interface Props {
   button: string;
+  /** What the button is for, for who can't see where it stands. */
+  about?: string;
   send: (entered: FormData) => Promise<void>;
   children?: ComponentChildren;
 }
 
-export function Action({ button, send, children }: Props) {
+export function Action({ button, about, send, children }: Props) {
   const words = useWords();
   const [failed, setFailed] = useState<string | null>(null);
   const [busy, setBusy] = useState(false);
@@ -30,6 +32,7 @@ export function Action({ button, send, children }: Props) {
       {children}
       <button type="submit" disabled={busy}>
         {button}
+        {about && <span class="unseen"> {about}</span>}
       </button>
       {failed && (
         <p class="note bad" role="alert">

@@ -1,4 +1,4 @@
-/** People and tokens, for the administrator. */
+/** Products, places, people and tokens, for the administrator. */
 import { useState } from "preact/hooks";
 import { useSurroundings } from "../context.ts";
 import type { Camera, Grant, PageOf, Place, Token, User } from "../data/answers.ts";
@@ -8,6 +8,9 @@ import { fullMoment } from "../format/dates.ts";
 import { bytes } from "../format/numbers.ts";
 import { useWords } from "../i18n/index.ts";
 import { Action } from "../parts/action.tsx";
+import { ChoiceEntry, Edit } from "../parts/edit.tsx";
+import { Facts } from "../parts/facts.tsx";
+import { PlaceNames, Products } from "./settings-site.tsx";
 
 const ROLES = ["percent", "viewer", "operator", "admin"] as const;
 const TOKENS = ["camera", "read", "metrics", "admin"] as const;
@@ -20,6 +23,8 @@ export function Settings() {
     <div class="whole single">
       <main id="main" class="stack" tabIndex={-1}>
         <h1>{t("settings.title")}</h1>
+        <Products />
+        <PlaceNames />
         <People />
         <Tokens />
         <Machine />
@@ -89,7 +94,7 @@ const Roles = () => {
   );
 };
 
-const Places = ({ places }: { places: Place[] }) => {
+const Places = ({ places, chosen = "" }: { places: Place[]; chosen?: string }) => {
   const { t } = useWords();
   return (
     <label class="field">
@@ -97,7 +102,7 @@ const Places = ({ places }: { places: Place[] }) => {
       <select name="place">
         <option value="">{t("settings.everywhere")}</option>
         {places.map((place) => (
-          <option key={place.id} value={place.id}>
+          <option key={place.id} value={place.id} selected={place.id === chosen}>
             {place.name}
           </option>
         ))}
@@ -121,15 +126,46 @@ function Person({ user, places }: { user: User; places: Place[] }) {
         {user.disabled && <span class="badge bad">{t("settings.locked")}</span>}
       </div>
       {!user.disabled && (
-        <Action
-          button={t("settings.lock", { name: user.name })}
-          send={async () => {
-            await change("DELETE", `users/${encodeURIComponent(user.name)}`);
-            again("user");
-          }}
-        />
+        <div class="row">
+          <RoleForm user={user} places={places} />
+          <Action
+            button={t("settings.lock", { name: user.name })}
+            send={async () => {
+              await change("DELETE", `users/${encodeURIComponent(user.name)}`);
+              again("user");
+            }}
+          />
+        </div>
       )}
     </li>
+  );
+}
+
+const NONE = "none";
+
+/** Gives a role on a place, in place of one that was there; or takes it. */
+function RoleForm({ user, places }: { user: User; places: Place[] }) {
+  const { t } = useWords();
+  const first = user.grants[0];
+  const send = async (entered: FormData) => {
+    const place = String(entered.get("place")) || null;
+    const role = String(entered.get("role"));
+    const before = user.grants.find((grant) => grant.place === place);
+    if (role !== NONE) await change("POST", "grants", { user: user.name, place, role });
+    else if (before) await change("DELETE", `grants/${before.id}`);
+    again("user");
+  };
+  const roles = ROLES.map((role) => ({ value: role as string, text: t(`role.${role}`) }));
+  return (
+    <Edit name={user.name} version={user.grants.length} send={send}>
+      <ChoiceEntry
+        name="role"
+        label={t("settings.role")}
+        value={first?.role ?? ""}
+        of={[...roles, { value: NONE, text: t("settings.nothing") }]}
+      />
+      <Places places={places} chosen={first?.place ?? ""} />
+    </Edit>
   );
 }
 
@@ -218,14 +254,7 @@ function Machine() {
   return (
     <section class="panel stack" aria-labelledby="machine">
       <h2 id="machine">{t("machine.title")}</h2>
-      <dl class="facts">
-        {rows.map(([name, value]) => (
-          <div key={name}>
-            <dt>{name}</dt>
-            <dd>{value}</dd>
-          </div>
-        ))}
-      </dl>
+      <Facts rows={rows} />
     </section>
   );
 }

@@ -1,19 +1,23 @@
-/** Below a silo: events, tickets, calibration, rules; one at a time, by keyboard as the ARIA practices say. */
+/** Below a silo: events, tickets, calibration, rules, settings; one at a time, by keyboard as the ARIA practices say. */
 import { useRef, useState } from "preact/hooks";
-import type { Event, PageOf, Place, Rule, Silo } from "../data/answers.ts";
+import { atLeast } from "../context.ts";
+import type { Event, PageOf, Silo } from "../data/answers.ts";
 import { useResource } from "../data/resources.ts";
 import { duration, moment } from "../format/dates.ts";
-import { mass, number, percent, volume } from "../format/numbers.ts";
+import { mass, volume } from "../format/numbers.ts";
 import { useWords } from "../i18n/index.ts";
 import { Amount } from "../parts/amount.tsx";
 import { link, TABS, type Tab } from "../router.ts";
-import { inForce } from "./places.ts";
 import { Calibrations } from "./silo-calibration.tsx";
+import { Rules } from "./silo-rules.tsx";
+import { SiloSettings } from "./silo-settings.tsx";
 import { Tickets } from "./silo-tickets.tsx";
 
 export function Tabs({ silo, tab }: { silo: Silo; tab: Tab }) {
   const { t } = useWords();
   const list = useRef<HTMLDivElement>(null);
+  const tabs = TABS.filter((one) => one !== "settings" || atLeast(silo.role, "admin"));
+  const shown = tabs.includes(tab) ? tab : "events";
   const open = (next: Tab) => {
     window.location.replace(link.silo(silo.id, next));
     list.current?.querySelector<HTMLElement>(`#tab-${next}`)?.focus();
@@ -21,30 +25,30 @@ export function Tabs({ silo, tab }: { silo: Silo; tab: Tab }) {
   const step = (event: KeyboardEvent) => {
     const way = { ArrowRight: 1, ArrowLeft: -1 }[event.key];
     // The focus moves at once, the address a moment later.
-    const at = TABS.findIndex((one) => `tab-${one}` === (event.target as HTMLElement).id);
-    const next = way && TABS[(at + way + TABS.length) % TABS.length];
+    const at = tabs.findIndex((one) => `tab-${one}` === (event.target as HTMLElement).id);
+    const next = way && tabs[(at + way + tabs.length) % tabs.length];
     if (next) open(next);
   };
   return (
     <>
       <div ref={list} role="tablist" aria-label={t("silo.more")} onKeyDown={step}>
-        {TABS.map((one) => (
+        {tabs.map((one) => (
           <button
             key={one}
             id={`tab-${one}`}
             type="button"
             role="tab"
-            aria-selected={one === tab}
+            aria-selected={one === shown}
             aria-controls="tab-panel"
-            tabIndex={one === tab ? 0 : -1}
+            tabIndex={one === shown ? 0 : -1}
             onClick={() => open(one)}
           >
             {t(`tab.${one}`)}
           </button>
         ))}
       </div>
-      <div id="tab-panel" role="tabpanel" aria-labelledby={`tab-${tab}`} class="stack">
-        <Panel silo={silo} tab={tab} />
+      <div id="tab-panel" role="tabpanel" aria-labelledby={`tab-${shown}`} class="stack">
+        <Panel silo={silo} tab={shown} />
       </div>
     </>
   );
@@ -53,6 +57,7 @@ export function Tabs({ silo, tab }: { silo: Silo; tab: Tab }) {
 function Panel({ silo, tab }: { silo: Silo; tab: Tab }) {
   if (tab === "tickets") return <Tickets silo={silo} />;
   if (tab === "calibration") return <Calibrations silo={silo} />;
+  if (tab === "settings") return <SiloSettings silo={silo} />;
   return tab === "rules" ? <Rules silo={silo} /> : <Events silo={silo} />;
 }
 
@@ -110,54 +115,6 @@ function Events({ silo }: { silo: Silo }) {
           {t("events.more")}
         </button>
       )}
-    </>
-  );
-}
-
-function Rules({ silo }: { silo: Silo }) {
-  const { t, named, locale } = useWords();
-  const rules = useResource<PageOf<Rule>>("rules", "rule");
-  const places = useResource<PageOf<Place>>("places", "place");
-  const rows = inForce(rules.data?.items ?? [], silo, places.data?.items ?? []);
-  const level = ({ unit }: Rule, told: number | null) => {
-    const value = told ?? silo.stale_after_s;
-    if (unit.startsWith("fraction")) return percent(locale, value);
-    return unit === "seconds" ? duration(locale, value) : duration(locale, value * 3600);
-  };
-  if (rows.length === 0) return <p class="quiet">{t("rules.none")}</p>;
-  return (
-    <>
-      <p class="quiet small">{t("rules.about")}</p>
-      <div class="scroll">
-        <table>
-          <thead>
-            <tr>
-              <th scope="col">{t("rules.kind")}</th>
-              <th scope="col" class="number">
-                {t("rules.level")}
-              </th>
-              <th scope="col" class="number">
-                {t("rules.clear")}
-              </th>
-              <th scope="col" class="number">
-                {t("rules.delay")}
-              </th>
-            </tr>
-          </thead>
-          <tbody>
-            {rows.map((rule) => (
-              <tr key={rule.id}>
-                <th scope="row">
-                  {named("alert", rule.kind)} {!rule.enabled && <span class="badge">{t("rules.off")}</span>}
-                </th>
-                <td class="number">{level(rule, rule.level)}</td>
-                <td class="number">{level(rule, rule.clear)}</td>
-                <td class="number">{rule.delay_s ? duration(locale, rule.delay_s) : number(locale, 0, 0)}</td>
-              </tr>
-            ))}
-          </tbody>
-        </table>
-      </div>
     </>
   );
 }

@@ -15,10 +15,11 @@ export function Tickets({ silo }: { silo: Silo }) {
   const path = `silos/${encodeURIComponent(silo.id)}/tickets`;
   const tickets = useResource<PageOf<Ticket>>(path, "ticket", `of:${silo.id}`);
   const rows = tickets.data?.items ?? [];
+  const mayEnter = atLeast(silo.role, "operator");
   return (
     <>
       <p class="quiet small">{t("tickets.about")}</p>
-      {atLeast(silo.role, "operator") && <TicketForm path={path} />}
+      {mayEnter && <TicketForm path={path} />}
       {rows.length > 0 && (
         <div class="scroll">
           <table>
@@ -30,6 +31,7 @@ export function Tickets({ silo }: { silo: Silo }) {
                 </th>
                 <th scope="col">{t("tickets.number")}</th>
                 <th scope="col">{t("tickets.by")}</th>
+                {mayEnter && <td />}
               </tr>
             </thead>
             <tbody>
@@ -41,6 +43,11 @@ export function Tickets({ silo }: { silo: Silo }) {
                   </td>
                   <td>{ticket.number}</td>
                   <td>{ticket.created_by}</td>
+                  {mayEnter && (
+                    <td>
+                      <Withdraw path={path} ticket={ticket} />
+                    </td>
+                  )}
                 </tr>
               ))}
             </tbody>
@@ -49,6 +56,21 @@ export function Tickets({ silo }: { silo: Silo }) {
       )}
       {tickets.data && rows.length === 0 && <p class="quiet">{t("tickets.none")}</p>}
     </>
+  );
+}
+
+/** Takes back a ticket that was mistyped; the audit log keeps who did. */
+function Withdraw({ path, ticket }: { path: string; ticket: Ticket }) {
+  const { t } = useWords();
+  return (
+    <Action
+      button={t("tickets.remove")}
+      about={ticket.number ?? ""}
+      send={async () => {
+        await change("DELETE", `${path}/${encodeURIComponent(ticket.id)}`);
+        changed((topics) => topics.includes("ticket"));
+      }}
+    />
   );
 }
 

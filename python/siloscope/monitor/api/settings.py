@@ -254,6 +254,18 @@ def get_products(connection: Reading, person: PersonOf) -> models.Page[models.Pr
     return models.Page(items=[_product(row) for row in places.listed(connection, "product")])
 
 
+@router.get("/usual-products", response_model=models.Page[models.UsualProduct], responses=refusals())
+def get_usual_products(_person: PersonOf) -> models.Page[models.UsualProduct]:
+    """The built-in table of bulk densities, with the spread between lots."""
+    from siloscope.content.density import products
+
+    items = [
+        models.UsualProduct(name=name, density_kg_m3=one.loose, density_std_kg_m3=one.std)
+        for name, one in sorted(products().items())
+    ]
+    return models.Page(items=items)
+
+
 @router.put("/products/{product}", response_model=models.Product, responses=CHANGED)
 def put_product(
     product: Key,

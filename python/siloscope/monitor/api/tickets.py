@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any
 
-from fastapi import APIRouter, Query, Request
+from fastapi import APIRouter, Path, Query, Request, Response
 
 from siloscope.monitor import access
 from siloscope.monitor.api import models, views
@@ -65,3 +65,29 @@ def post_ticket(
         people.log(connection, now, person.name, "add ticket", found.id, address=address_of(request))
     service.announce()
     return _ticket(found)
+
+
+@router.delete(
+    "/silos/{silo}/tickets/{ticket}",
+    status_code=204,
+    response_class=Response,
+    responses=refusals("not-found", "forbidden", "cross-origin"),
+)
+def delete_ticket(
+    silo: SiloOf,
+    ticket: Annotated[str, Path(max_length=80)],
+    person: PersonOf,
+    service: ServiceOf,
+    request: Request,
+) -> Response:
+    """Takes back a ticket that was entered wrongly; the audit log keeps what it said."""
+    now = service.clock.now()
+    with service.store.write() as connection:
+        need("operator", person, access.around(connection, silo.row))
+        gone = tickets.remove(connection, silo.row.id, ticket, now)
+        if gone is None:
+            raise Problem("not-found", f"there is no ticket '{ticket}' of '{silo.row.id}'")
+        told = {"number": gone.number, "mass_kg": gone.mass, "time": views.at(gone.time).isoformat()}
+        people.log(connection, now, person.name, "remove ticket", ticket, detail=told, address=address_of(request))
+    service.announce()
+    return Response(status_code=204)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import Connection, insert, select
+from sqlalchemy import Connection, delete, insert, select
 
 from siloscope.monitor.store import changes
 from siloscope.monitor.store.engine import new_id
@@ -20,6 +20,16 @@ def add(connection: Connection, values: dict[str, Any]) -> Record:
     connection.execute(insert(ticket).values(id=key, **values))
     changes.note(connection, "ticket", key, values["silo"], values["created"])
     return connection.execute(select(ticket).where(ticket.c.id == key)).one()
+
+
+def remove(connection: Connection, silo: str, key: str, now: int) -> Record | None:
+    """Removes a silo's ticket; what it was, None where there is none."""
+    of = (ticket.c.silo == silo, ticket.c.id == key)
+    found = connection.execute(select(ticket).where(*of)).one_or_none()
+    if found is not None:
+        connection.execute(delete(ticket).where(*of))
+        changes.note(connection, "ticket", key, silo, now)
+    return found
 
 
 def listed(connection: Connection, silo: str, span: Span) -> Sequence[Record]:

@@ -64,6 +64,7 @@ from siloscope.monitor.api.models.things import (
     Run,
     Silo,
     Site,
+    UsualProduct,
 )
 
 __all__ = [
@@ -127,6 +128,7 @@ __all__ = [
     "TokenTold",
     "Trend",
     "User",
+    "UsualProduct",
     "Vessel",
     "VesselChange",
     "Welcome",

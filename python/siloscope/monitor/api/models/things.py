@@ -55,6 +55,14 @@ class Product(Model):
     version: int
 
 
+class UsualProduct(Model):
+    """A product of the built-in table, to begin from."""
+
+    name: str
+    density_kg_m3: float
+    density_std_kg_m3: float
+
+
 class Silo(Model):
     """A silo with what a card shows."""
 
