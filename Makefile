@@ -155,7 +155,7 @@ SERVICES := postgresql-15 mosquitto mbpoll prometheus nginx-light chromium
 services: ## installs the servers and clients that the service is tested with (Debian, as root); without them those tests are skipped
 	apt-get install -y --no-install-recommends $(SERVICES)
 
-monitor-proof: build ## kills the service 100 times and cuts its power 20 times under senders; about half an hour
+monitor-proof: build ## kills the service 100 times, cuts its power 20 times, fills its disk, under senders; about half an hour
 	cd tests && ../$(BIN)/python -m monitor.hardships --kills 100 --frames 10000 --cuts 20
 
 results: build ## repeats the paper's evaluation and writes docs/results.md

@@ -32,6 +32,9 @@ MAGIC = b"\x89PNG\r\n\x1a\n"
 
 CLIENTS = 4
 
+UP_S = (0.2, 3.0)
+"""Between a start, which takes longer, and a kill, s."""
+
 
 @dataclass
 class Senders:
@@ -130,7 +133,7 @@ def kills(folder: Path, times: int, *, size: int = 20_000, careless: str | None 
         with senders:
             done = 0
             while done < times or len(senders.acknowledged) < least:
-                time.sleep(draw.uniform(0.2, 1.2))
+                time.sleep(draw.uniform(*UP_S))
                 server.kill()
                 done += 1
                 server.site = None  # it is applied already
@@ -256,6 +259,8 @@ def main() -> int:
             print(found["cuts"], flush=True)
             control = power_cuts(place / "control", 3, careless="no-flush")
             print(f"control without flushes: {control}", flush=True)
+            found["full"], before = full_disk(place / "full")
+            print(f"full disk, {before} acknowledged before there was room again: {found['full']}", flush=True)
         return 1 if any(one.lost for one in found.values()) else 0
 
 

@@ -13,7 +13,6 @@ from fastapi import FastAPI, Request, Response
 from fastapi.exceptions import RequestValidationError
 from fastapi.responses import FileResponse, JSONResponse
 from sqlalchemy.exc import OperationalError
-from starlette.datastructures import MutableHeaders
 from starlette.exceptions import HTTPException
 from starlette.routing import Route
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
@@ -49,7 +48,7 @@ PAGES = "/{path:path}"
 PAGE = Path(__file__).parents[1] / "page"
 
 ROUTERS = (
-    *(silos.router, readings.router, frames.router, looking.router, alerts.router, rules.router, calibrations.router),
+    *(frames.router, silos.router, readings.router, looking.router, alerts.router, rules.router, calibrations.router),
     *(tickets.router, settings.router, session.router, people.router, deliveries.router, edge.router),
     *(stream.router, health.router),
 )
@@ -62,6 +61,9 @@ HEADERS = {
     "Referrer-Policy": "no-referrer",
     "Cross-Origin-Opener-Policy": "same-origin",
 }
+
+SENT = [(name.lower().encode(), value.encode()) for name, value in {**HEADERS, "Cache-Control": "no-store"}.items()]
+"""The same as they go over the line; the last one is of the interface alone."""
 
 STATUS_SLUGS = {401: "unauthorized", 403: "forbidden", 404: "not-found", 405: "method-not-allowed", 413: "too-large"}
 
@@ -160,11 +162,9 @@ class _WithHeaders:
 
         async def with_headers(message: Message) -> None:
             if message["type"] == "http.response.start":
-                headers = MutableHeaders(scope=message)
-                for name, value in HEADERS.items():
-                    headers.setdefault(name, value)
-                if scope["path"].startswith(PREFIX):
-                    headers.setdefault("Cache-Control", "no-store")
+                there = {name.lower() for name, _ in message["headers"]}
+                usual = SENT if scope["path"].startswith(PREFIX) else SENT[:-1]
+                message["headers"] = [*message["headers"], *(one for one in usual if one[0] not in there)]
             await send(message)
 
         await self._app(scope, receive, with_headers if scope["type"] == "http" else send)

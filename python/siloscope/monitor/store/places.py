@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Sequence
 from typing import Any
 
-from sqlalchemy import Connection, Table, insert, or_, select, update
+from sqlalchemy import Connection, Select, Table, bindparam, insert, or_, select, update
 
 from siloscope.monitor.store import changes
 from siloscope.monitor.store.engine import new_id
@@ -30,13 +30,18 @@ def listed(connection: Connection, kind: str) -> Sequence[Record]:
     return connection.execute(wanted).all()
 
 
+def _one_of(table: Table) -> Select[Any]:
+    wanted = select(table).where(table.c.id == bindparam("key"))
+    return wanted.where(table.c.removed.is_(None)) if "removed" in table.c else wanted
+
+
+ONE = {kind: _one_of(table) for kind, table in TABLES.items()}
+"""Made once: making a statement takes longer than it takes SQLite to answer it."""
+
+
 def get(connection: Connection, kind: str, key: str) -> Record | None:
     """One that is not removed."""
-    table = TABLES[kind]
-    wanted = select(table).where(table.c.id == key)
-    if "removed" in table.c:
-        wanted = wanted.where(table.c.removed.is_(None))
-    return connection.execute(wanted).one_or_none()
+    return connection.execute(ONE[kind], {"key": key}).one_or_none()
 
 
 def put(connection: Connection, kind: str, key: str, values: dict[str, Any], now: int) -> bool:
