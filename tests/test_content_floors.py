@@ -65,6 +65,23 @@ def test_an_empty_vessel_reads_nothing(kind: str, tmp_path: Path) -> None:
     assert content.volume < min(3.0 * content.volume_std, 0.02 * seen.capacity)
 
 
+@pytest.mark.parametrize(("kind", "seeds"), [("pyramid", (960, 961, 963)), ("two_stage", (962,))])
+def test_what_lies_out_of_view_is_in_the_deviation(kind: str, seeds: tuple[int, ...], tmp_path: Path) -> None:
+    """Cameras that look past the outlet, and feed that lies where they don't look: 0.5 to 1.5 % of the capacity."""
+    errors = []
+    for seed in seeds:
+        empty = vessels.Seen.draw(kind, seed).with_feed(None)
+        low, radius = empty.vessel.bottom.lowest, empty.vessel.wall.radius
+        z = low - 0.15 * (low - 0.9)
+        for feed in (Feed(z), Feed(z, tip=Tip(0.1 * radius, 0.1 * radius, z - 0.2 * radius, math.tan(0.45)))):
+            seen = empty.with_feed(feed)
+            content = siloscope.measure(seen.frame, seen.calibration(), vessel=vessel_file(seen, tmp_path / "v.toml"))
+            if content.volume is not None and content.volume_std is not None:
+                errors.append((content.volume - seen.content) / content.volume_std)
+    assert len(errors) >= 2 * len(seeds) - 1
+    assert max(map(abs, errors)) < 3.5, errors
+
+
 @pytest.mark.parametrize("outlet", [0.0, 0.3])
 @pytest.mark.parametrize("azimuth", [0.0, 0.3])
 def test_wedge_and_pyramid_hold_what_integration_says(outlet: float, azimuth: float) -> None:

@@ -1,4 +1,4 @@
-"""What a surface of which only a small part is seen may do beyond it.
+"""What a surface of which only a small part is seen may do beyond it, and what an empty vessel may hide.
 
 The fit goes on with the slope that it has seen. Feed need not: a crater ends in the ring that is left along the wall, a
 heap in the level that it was poured on, and no frame that shows the flank alone tells where.
@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope import _core
 from siloscope.content.measured import Measured
 from siloscope.content.over_floor import OverFloor
 from siloscope.content.ullage import Ullage
@@ -23,6 +24,11 @@ LITTLE = 0.2
 
 BREAK = 0.5
 """Standard deviation of the height beyond what is seen, as a share of what the fit rises by from there."""
+
+
+def hidden_std(found: _core.ContentMeasure) -> float:
+    """What an empty vessel may hide, as a standard deviation, m³: anything up to the most is as probable."""
+    return found.hidden / math.sqrt(3.0)
 
 
 def break_std(surface: SurfaceMap, coverage: float | None) -> float:

@@ -37,6 +37,9 @@ ANOTHER_VESSEL = 0.1
 WALL_STD = 0.002
 """How uneven a wall is that nothing tells more about, m (standard deviation)."""
 
+DETECTABLE = 3.0
+"""Content thinner than so many standard deviations of a cell's thickness goes unseen."""
+
 
 @dataclass(frozen=True, eq=False)
 class Knowledge:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from siloscope import _core
-from siloscope.content.knowledge import Knowledge
+from siloscope.content.knowledge import DETECTABLE, WALL_STD, Knowledge
 from siloscope.content.setup import CoreVessel
 from siloscope.content.ullage import GROUPS, Ullage, std_by, top_std
 from siloscope.types.content import Parts
@@ -59,7 +59,8 @@ def volume_over(floor: FloorMap, found: _core.ContentMeasure, known: Knowledge, 
         by += _of_floor(floor.derivatives) * (counted / whole)  # the floor's own move with camera and sensor
     capacity_by = _capacity_derivatives(floor, silo, bottom, known.lengths.top_from)
     rest_std = max(float(bottom_std.sum() * area) - floor_std, 0.0)
-    volume_parts, std = _deviations(by, found, known, floor_std)
+    layer = floor_std if under else DETECTABLE * math.hypot(WALL_STD, floor.mean_std) * whole
+    volume_parts, std = _deviations(by, found, known, layer)
     rest_std = math.hypot(rest_std, top_std(known, silo))
     ullage_parts, ullage_std = _deviations(capacity_by - by, found, known, rest_std)
     capacity = float((bottom - silo[3]).sum() * area)

@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 from siloscope import _core
 from siloscope.content import quality
 from siloscope.content.alone import meaning, spoken_alone
-from siloscope.content.beyond import break_std, widened
+from siloscope.content.beyond import break_std, hidden_std, widened
 from siloscope.content.capacity import Strapping
 from siloscope.content.density import Density
 from siloscope.content.fitting import lengths_for_core
-from siloscope.content.knowledge import PARAMETERS, WALL_STD, Knowledge
+from siloscope.content.knowledge import DETECTABLE, PARAMETERS, WALL_STD, Knowledge
 from siloscope.content.measured import Measured
 from siloscope.content.over_floor import OverFloor, volume_over
 from siloscope.content.setup import CoreVessel
@@ -34,9 +34,6 @@ FEWEST = 3
 
 STRAY = 0.02
 """Nor is a smaller fraction of the bare cells."""
-
-DETECTABLE = 3.0
-"""A heap on the vertex lower than so many standard deviations of a cell's thickness goes unseen."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +64,7 @@ def content_of(
     over = None if known.floor.map is None else volume_over(known.floor.map, core, known, silo)
     free = ullage_of(core, known, silo) if over is None else over.free
     coverage = _coverage(core)
-    more = 0.0 if core.surface is None else break_std(SurfaceMap(core.surface, 0.0, silo[0]), coverage)
+    more = hidden_std(core) if core.surface is None else break_std(SurfaceMap(core.surface, 0.0, silo[0]), coverage)
     found, over, free = widened(Measured.of(core), over, free, more)
     lacking = lacking or _vague(over)
     capacity, capacity_from = _capacity(request, silo, lacking, over)
@@ -94,7 +91,9 @@ def content_of(
         found = _with_move(found)
     volume = core.volume
     answer = (
-        _empty(request, core, silo, over) if volume is None else _filled(request, found, volume, silo, lacking, over)
+        _empty(request, core, silo, lacking, over)
+        if volume is None
+        else _filled(request, found, volume, silo, lacking, over)
     )
     parts = None if lacking else found.parts
     if lacking:
@@ -184,18 +183,18 @@ def _filled(
     }
 
 
-def _empty(request: Request, core: _core.ContentMeasure, silo: CoreVessel, over: OverFloor | None) -> dict[str, Any]:
-    """No content seen: none, up to the level that could hide unseen on the vertex, or all over a mapped floor."""
+def _empty(
+    request: Request, core: _core.ContentMeasure, silo: CoreVessel, lacking: tuple[str, ...], over: OverFloor | None
+) -> dict[str, Any]:
+    """No content seen: none, but a heap on the vertex or a layer on a mapped floor, and what the unseen floor hides."""
     known = request.known
     volume, std = None, None
-    if over is not None and known.floor.map is not None:
-        volume, std = 0.0, DETECTABLE * math.hypot(WALL_STD, known.floor.map.mean_std) * math.pi * silo[0] ** 2
-    elif not known.missing:
-        radius, bottom, apex, *_ = silo
+    if over is not None and not lacking:
+        volume, std = 0.0, over.std
+    elif not known.missing and not lacking:
         thin = DETECTABLE * math.hypot(WALL_STD, math.sqrt(max(float(known.covariance[6, 6]), 0.0)))
-        nearest = 0.0 if core.bare is None else core.bare.nearest
-        hidden = max(thin, nearest * (apex - bottom) / radius)
-        volume, std = 0.0, _core.vessel_volume_below(silo, [apex - hidden])[0]
+        heap = _core.vessel_volume_below(silo, [silo[2] - thin])[0]
+        volume, std = 0.0, math.hypot(heap, hidden_std(core))
     return {
         "volume": volume,
         "volume_std": std,

@@ -31,6 +31,8 @@ pub struct ContentMeasure {
     shape: Option<Shape>,
     /// Where the bare floor is seen; None where it is not.
     bare: Option<BareFloor>,
+    /// Most that the unseen floor can hide where no surface is seen, m³; else 0.
+    hidden: f64,
     /// Fraction of the seen cells surely below the floor.
     sunken: f64,
     /// Counts of the returns.
@@ -57,6 +59,7 @@ impl ContentMeasure {
             holes: components(&content.holes),
             shape: content.shape.map(Shape),
             bare: content.bare.map(|[nearest, farthest]| BareFloor { nearest, farthest }),
+            hidden: content.hidden,
             sunken: content.sunken,
             returns: (&content.tally).into(),
             visibility: content.sight.into(),

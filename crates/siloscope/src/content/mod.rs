@@ -10,6 +10,7 @@ pub mod detail;
 pub mod fit;
 pub mod grid;
 pub mod heights;
+pub mod hidden;
 pub mod jacobian;
 pub mod roughness;
 pub mod setup;
@@ -30,6 +31,7 @@ use self::cells::{Cell, Counts, gather};
 use self::classify::{Classified, Floor, Thing, classify, extent};
 use self::fit::Surface;
 use self::grid::Grid;
+use self::hidden::hidden;
 use self::jacobian::{CalibrationJacobian, Parameters};
 use self::shape::Shape;
 use self::silo_points::{SiloPoints, Source};
@@ -64,6 +66,8 @@ pub struct Content {
     pub shape: Option<Shape>,
     /// Distances from the axis of the nearest and the farthest cell that shows the bare floor.
     pub bare: Option<[f64; 2]>,
+    /// Most that the unseen floor can hide where no surface is seen, m³; else 0.
+    pub hidden: f64,
     /// Share of the seen cells that lie surely below the floor.
     pub sunken: f64,
     /// Counts of the frame.
@@ -89,6 +93,7 @@ pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
     let sight = visibility(source, &returns, &setup.vessel, &setup.pose, setup.range);
     let shift = shift(&returns, &setup.vessel, &jacobian, &setup.noise, &setup.covariance, surface.as_ref());
     let bare = extent(&grid, (0..grid.count()).filter(|&i| matches!(kinds[i], Kind::Bare | Kind::Rim)));
+    let hidden = if surface.is_some() { 0.0 } else { hidden(&grid, &kinds, &setup.under()) };
     Ok(Content {
         grid,
         cells,
@@ -101,6 +106,7 @@ pub fn measure(source: Source<'_>, setup: &Setup) -> Result<Content> {
         holes,
         shape,
         bare,
+        hidden,
         sunken,
         tally,
         sight,
