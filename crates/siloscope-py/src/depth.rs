@@ -4,6 +4,7 @@ use crate::arrays::in_c_order;
 use crate::convert::value_error;
 use numpy::{Element, PyArray1, PyArray2, PyArrayMethods, PyReadonlyArray2, PyUntypedArrayMethods};
 use pyo3::prelude::*;
+use siloscope::geometry::equal_runs as runs;
 
 /// Raw 16-bit depth that means "no measurement".
 const SENTINEL: u16 = u16::MAX;
@@ -44,7 +45,43 @@ fn converted<'py, T: Element + Copy + Sync>(
     Ok(MetricDepth { depth: PyArray1::from_vec(py, values).reshape(shape)?.unbind(), any_measured })
 }
 
+/// Numbers of pixels.
+#[pyclass(frozen, get_all, module = "siloscope._core")]
+struct EqualRuns {
+    /// In runs of the length asked for, or longer.
+    long: usize,
+    /// In shorter runs of at least half that length.
+    half: usize,
+    /// Equal to the one before.
+    equal: usize,
+    /// With a measurement.
+    measured: usize,
+}
+
+/// Runs of equal depths along rows (n, m), 0 for no measurement; `long` pixels are a long run.
+#[pyfunction]
+fn equal_runs(py: Python<'_>, lines: PyReadonlyArray2<'_, f32>, long: usize) -> PyResult<EqualRuns> {
+    let (lines, mut strided) = (lines.as_array(), Vec::new());
+    let counted = py.detach(|| {
+        let mut counted = runs::EqualRuns::default();
+        for line in lines.rows() {
+            if let Some(line) = line.as_slice() {
+                counted.add(line, long);
+            } else {
+                strided.clear();
+                strided.extend(line.iter());
+                counted.add(&strided, long);
+            }
+        }
+        counted
+    });
+    let runs::EqualRuns { long, half, equal, measured } = counted;
+    Ok(EqualRuns { long, half, equal, measured })
+}
+
 pub fn register(m: &Bound<'_, PyModule>) -> PyResult<()> {
     m.add_class::<MetricDepth>()?;
+    m.add_class::<EqualRuns>()?;
+    m.add_function(wrap_pyfunction!(equal_runs, m)?)?;
     m.add_function(wrap_pyfunction!(depth_metres, m)?)
 }

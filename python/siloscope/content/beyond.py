@@ -33,8 +33,10 @@ def hidden_std(found: _core.ContentMeasure) -> float:
 
 def break_std(surface: SurfaceMap, coverage: float | None) -> float:
     """What it adds to the volume's standard deviation, m³, where less than `LITTLE` of the surface is seen."""
+    if coverage is None or coverage >= LITTLE:
+        return 0.0
     seen = surface.seen & surface.inside
-    if coverage is None or coverage >= LITTLE or not seen.any():
+    if not seen.any():
         return 0.0
     y, x = np.meshgrid(surface.y, surface.x, indexing="ij")
     edge, beyond = seen & ~_inner(seen), surface.inside & ~seen

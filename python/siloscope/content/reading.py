@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -172,14 +173,13 @@ def _filled(
     level = _level(under, found.total, core, datum)
     surface = None if core is None else SurfaceMap(core, datum, silo[0])
     volume, std = (None, None) if lacking else _volume(request, (under.volume, found.total), silo, level, over)
-    columns = _columns(surface, silo) if over is None else over.columns[over.columns > 0.0]
     return {
         "volume": volume,
         "volume_std": std,
         "level": level,
         "height_datum": _datum(request.known),
         "surface": surface,
-        **_mass(request.density, volume, std, columns, silo),
+        **_mass(request.density, volume, std, lambda: _columns(surface, silo, over), silo),
     }
 
 
@@ -200,7 +200,7 @@ def _empty(
         "volume_std": std,
         "level": Level(*[0.0] * 4),
         "height_datum": _datum(known),
-        **_mass(request.density, volume, std, np.zeros(0), silo),
+        **_mass(request.density, volume, std, lambda: np.zeros(0), silo),
     }
 
 
@@ -286,12 +286,12 @@ def _mass(
     density: Density | None,
     volume: float | None,
     std: float | None,
-    columns: NDArray[np.float64],
+    columns: Callable[[], NDArray[np.float64]],
     silo: CoreVessel,
 ) -> dict[str, Any]:
     if density is None or volume is None or std is None:
         return {"density": None if density is None else density.to_dict()}
-    mean = density.mean(columns, silo[0])
+    mean = density.mean(columns(), silo[0])
     own = density.std / density.loose * mean
     return {
         "mass": mean * volume,
@@ -300,8 +300,10 @@ def _mass(
     }
 
 
-def _columns(surface: SurfaceMap | None, silo: CoreVessel) -> NDArray[np.float64]:
+def _columns(surface: SurfaceMap | None, silo: CoreVessel, over: OverFloor | None) -> NDArray[np.float64]:
     """Heights of the content over the floor in the map's cells."""
+    if over is not None:
+        return over.columns[over.columns > 0.0]
     if surface is None:
         return np.zeros(0)
     radius, bottom, apex, *_ = silo

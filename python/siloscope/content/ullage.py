@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,6 +69,7 @@ def top_std(known: Knowledge, silo: CoreVessel) -> float:
     return 0.0 if known.lengths.top_from == "camera" else math.pi * silo[0] ** 2 * LENGTH_STD
 
 
+@lru_cache(maxsize=64)
 def _capacity(silo: CoreVessel) -> float:
     return float(_core.vessel_volume_below(silo, [silo[3]])[0])
 

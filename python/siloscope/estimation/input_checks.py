@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from siloscope import _core
 from siloscope.estimation.inputs import Prepared, PreparedDepth
 from siloscope.sensors import SensorProfile
 from siloscope.types.camera import Camera
@@ -135,23 +136,18 @@ def hole_remarks(depth: NDArray[np.float32]) -> Iterator[Remark]:
 
     Coarse sensors repeat values too, both ways and in runs of every length; filled holes are long runs among noise.
     """
-    some = [np.ascontiguousarray(image[:: max(1, len(image) // LINES)]) for image in (depth, depth.T)]
-    (filled, shorter, equal), (other, *_) = sorted(map(_repeated, some), reverse=True)
+    found = (_core.equal_runs(image[:: max(1, len(image) // LINES)], RUN) for image in (depth, depth.T))
+    (filled, shorter, equal), (other, *_) = sorted(map(_fractions, found), reverse=True)
     one_way = filled > FILLED and filled > ONE_WAY * max(other, shorter)
     if one_way and equal - filled < COARSE * (1.0 - filled):
         yield Remark("hole-filled", f"{100 * filled:.0f} % of the pixels repeat the value beside them in long rows")
 
 
-def _repeated(depth: NDArray[np.float32]) -> tuple[float, float, float]:
+def _fractions(runs: _core.EqualRuns) -> tuple[float, float, float]:
     """Fractions of the measured pixels: in runs of `RUN` equal ones or more along a row, in runs of half that, and
     equal to the one before."""
-    same = np.zeros((depth.shape[0], depth.shape[1] + 1), np.int8)
-    same[:, 1:-1] = (depth[:, 1:] == depth[:, :-1]) & (depth[:, 1:] > 0.0)
-    turns = np.diff(same.reshape(-1), append=0)
-    lengths = np.flatnonzero(turns < 0) - np.flatnonzero(turns > 0) + 1
-    seen = max(int(np.count_nonzero(depth > 0.0)), 1)
-    half = lengths[(lengths >= RUN // 2) & (lengths < RUN)]
-    return float(lengths[lengths >= RUN].sum()) / seen, float(half.sum()) / seen, float(np.count_nonzero(same)) / seen
+    seen = max(runs.measured, 1)
+    return runs.long / seen, runs.half / seen, runs.equal / seen
 
 
 def camera_remarks(camera: Camera) -> tuple[Remark, ...]:

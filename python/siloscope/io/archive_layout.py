@@ -53,9 +53,10 @@ def with_checksum(data: bytes) -> bytes:
 
 def without_checksum(data: bytes) -> bytes:
     """A chunk, if it is the one that its CRC-32C is of; raises `InputError`."""
-    if len(data) < 4 or struct.unpack("<I", data[-4:])[0] != _core.checksum(data[:-4]):
+    chunk = data[:-4]
+    if len(data) < 4 or struct.unpack("<I", data[-4:])[0] != _core.checksum(chunk):
         raise InputError("its chunk fails the checksum; the file is damaged")
-    return data[:-4]
+    return chunk
 
 
 def compressed(depth: NDArray[Any]) -> bytes:

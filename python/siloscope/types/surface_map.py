@@ -114,7 +114,8 @@ class SurfaceMap(ByValue):
     @property
     def seen(self) -> NDArray[np.bool_]:
         """(n, n) cells that show the content's surface."""
-        return np.isin(self.kinds, (KINDS["content"], KINDS["rim"]))
+        seen: NDArray[np.bool_] = (self.kinds == KINDS["content"]) | (self.kinds == KINDS["rim"])
+        return seen
 
     @cached_property
     def inside(self) -> NDArray[np.bool_]:

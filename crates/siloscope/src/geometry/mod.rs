@@ -3,6 +3,7 @@
 pub mod camera;
 pub mod convex_vessel;
 pub mod depth_image;
+pub mod equal_runs;
 pub mod evaluator;
 pub mod floor_map;
 pub mod label;
