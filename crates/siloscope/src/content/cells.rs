@@ -5,7 +5,7 @@ use super::grid::Grid;
 use super::jacobian::CalibrationJacobian;
 use super::silo_points::{ScanLine, SiloPoints};
 use crate::geometry::sensor::NoiseLaw;
-use crate::stats::robust::{MAD_TO_STD, upper_median_by};
+use crate::stats::robust::MAD_TO_STD;
 
 /// SiloPoints farther than so many robust standard deviations from their cell's median are clutter.
 const CLUTTER_SIGMAS: f32 = 4.0;
@@ -209,11 +209,12 @@ fn survey(returns: &SiloPoints<'_>, bound: &Bound, grid: &Grid, noise: &NoiseLaw
             }
         }
     });
-    let mut samples = by_cell(&samples, grid.count());
+    let samples = by_cell(&samples, grid.count());
     let mut windows = vec![CLOSED; grid.count()];
-    for group in samples.chunk_by_mut(|a, b| a.0 == b.0) {
+    let mut values = Vec::new();
+    for group in samples.chunk_by(|a, b| a.0 == b.0) {
         if let Some(window) = group.first().and_then(|s| windows.get_mut(s.0 as usize)) {
-            *window = self::window(group, noise);
+            *window = self::window(group, noise, &mut values);
         }
     }
     let sparse: Vec<(usize, Window)> = (samples.chunk_by(|a, b| a.0 == b.0))
@@ -258,21 +259,21 @@ impl Window {
     }
 }
 
-/// Median ± k robust standard deviations, at least those of the sensor's noise.
-fn window(group: &mut [Sample], noise: &NoiseLaw) -> Window {
+/// Median ± k robust standard deviations, at least those of the sensor's noise; `values` is room to work in.
+fn window(group: &[Sample], noise: &NoiseLaw, values: &mut Vec<f32>) -> Window {
     if group.len() < FEWEST {
         return CLOSED;
     }
-    let depth = median(group, |s| s.2);
-    let z = median(group, |s| s.1);
-    group.iter_mut().for_each(|s| s.1 = (s.1 - z).abs());
-    let scatter = MAD_TO_STD as f32 * median(group, |s| s.1);
+    let mut median_of = |value: &dyn Fn(&Sample) -> f32| {
+        values.clear();
+        values.extend(group.iter().map(value));
+        let (_, median, _) = values.select_nth_unstable_by(group.len() / 2, f32::total_cmp); // the upper one
+        *median
+    };
+    let depth = median_of(&|s| s.2);
+    let z = median_of(&|s| s.1);
+    let scatter = MAD_TO_STD as f32 * median_of(&|s| (s.1 - z).abs());
     let own = noise.sigma(f64::from(depth)) as f32;
     let half = CLUTTER_SIGMAS * scatter.max(own) + 1e-4;
     Window { low: z - half, high: z + half }
-}
-
-/// Upper median of a sample's height or depth; 0 for no sample.
-fn median(group: &mut [Sample], key: impl Fn(&Sample) -> f32) -> f32 {
-    upper_median_by(group, |s| f64::from(key(s))).unwrap_or(0.0) as f32
 }

@@ -39,6 +39,9 @@ pub struct ScanLine {
     /// True depth of each point.
     pub depth: Vec<f32>,
     rays: [Vec<f32>; 2],
+    /// For each axis of the silo frame, what a pinhole's columns and the line's row add to the point at depth 1.
+    along: [Vec<f32>; 3],
+    row: Option<[f32; 3]>,
 }
 
 impl ScanLine {
@@ -109,12 +112,14 @@ impl<'a> SiloPoints<'a> {
             Source::Depth(image) => {
                 line.resize(image.width.div_ceil(stride));
                 if let Some([columns, _]) = &self.axes {
-                    copy(&mut line.rays[0], columns, stride);
+                    for (along, [a, _, _]) in line.along.iter_mut().zip(self.rotation) {
+                        *along = columns.iter().step_by(stride).map(|u| a * u).collect();
+                    }
                 }
                 for (v, row) in image.depth.chunks_exact(image.width.max(1)).enumerate().step_by(stride) {
                     copy(&mut line.depth, row, stride);
                     if let Some([_, rows]) = &self.axes {
-                        line.rays[1].fill(rows[v]);
+                        line.row = Some(self.rotation.map(|[_, b, _]| b * rows[v]));
                     } else {
                         let rays = image.rays_of_row(v).unwrap_or_default();
                         load_rays(&mut line, rays.iter().step_by(stride));
@@ -125,17 +130,34 @@ impl<'a> SiloPoints<'a> {
         }
     }
 
+    /// Calls `see` for the true depths of every `stride`-th line, of every `stride`-th pixel of it; points as they are.
+    pub fn visit_depths(&self, stride: usize, mut see: impl FnMut(&[f32])) {
+        let Source::Depth(image) = self.source else { return self.visit(stride, |line| see(&line.depth)) };
+        let mut depth = vec![0.0; image.width.div_ceil(stride)];
+        for row in image.depth.chunks_exact(image.width.max(1)).step_by(stride) {
+            copy(&mut depth, row, stride);
+            self.correct(&mut depth);
+            see(&depth);
+        }
+    }
+
     /// From measured depths and rays to true depths and points.
     fn place(&self, line: &mut ScanLine) {
         self.correct(&mut line.depth);
-        let [rx, ry] = &line.rays;
         let [tx, ty] = self.translation;
-        for (out, (row, shift)) in
-            [&mut line.x, &mut line.y, &mut line.z].into_iter().zip(self.rotation.iter().zip([tx, ty, 0.0]))
-        {
-            let [a, b, c] = *row;
-            for (((out, &d), &u), &v) in out.iter_mut().zip(&line.depth).zip(rx).zip(ry) {
-                *out = d * (a * u + b * v + c) + shift;
+        let shifts = [tx, ty, 0.0];
+        let outs = [&mut line.x, &mut line.y, &mut line.z];
+        for (k, out) in outs.into_iter().enumerate() {
+            let ([a, b, c], shift) = (self.rotation[k], shifts[k]);
+            if let Some(row) = line.row {
+                for ((out, &d), &au) in out.iter_mut().zip(&line.depth).zip(&line.along[k]) {
+                    *out = d * (au + row[k] + c) + shift;
+                }
+            } else {
+                let [rx, ry] = &line.rays;
+                for (((out, &d), &u), &v) in out.iter_mut().zip(&line.depth).zip(rx).zip(ry) {
+                    *out = d * (a * u + b * v + c) + shift;
+                }
             }
         }
         self.round(line);

@@ -36,10 +36,10 @@ pub fn visibility(
     range: [f64; 2],
 ) -> Visibility {
     let (mut measured, mut near, mut all) = (0.0, 0.0, 0.0);
-    returns.visit(STRIDE, |line| {
-        all += line.len() as f64;
-        measured += line.depth.iter().filter(|&&d| d > 0.0).count() as f64;
-        near += line.depth.iter().filter(|&&d| d > 0.0 && f64::from(d) < TOO_NEAR * range[0]).count() as f64;
+    returns.visit_depths(STRIDE, |depth| {
+        all += depth.len() as f64;
+        measured += depth.iter().filter(|&&d| d > 0.0).count() as f64;
+        near += depth.iter().filter(|&&d| d > 0.0 && f64::from(d) < TOO_NEAR * range[0]).count() as f64;
     });
     Visibility {
         measured: measured / f64::max(all, 1.0),
