@@ -37,8 +37,9 @@ pub fn distance(
         return Distance { squared: 0.0, dof: 0 };
     }
     let own = DMatrix::from_fn(n, SIZE, |r, c| information[(told[r], c)]);
+    let columns = own.transpose();
     let pull = DVector::from_fn(n, |r, _| gradient[told[r]]);
-    let mut variance = &own * covariance * own.transpose();
+    let mut variance = (covariance * &columns).transpose() * columns; // few long columns take less time than many short
     for r in 0..n {
         for c in 0..n {
             variance[(r, c)] += excess * own[(r, rows[told[c]])];

@@ -3,7 +3,7 @@
 use crate::fusion::agreement::{CONE, Distance, PLACE, by_kind, distance, redescending_weight};
 use crate::fusion::earlier::Earlier;
 use crate::fusion::heights::Heights;
-use crate::fusion::placed::Placed;
+use crate::fusion::placed::{Placed, Placing};
 use crate::fusion::solve::{Solved, System};
 use crate::fusion::start::{Ground, Start, fullest, spread};
 use crate::fusion::sum::{Sum, counts, repeated, shown};
@@ -142,8 +142,9 @@ impl Rounds<'_> {
             spread(self.frames.len(), COMPARED).into_iter().map(|i| self.frames[i].clone()).collect();
         let some = Rounds { frames: &compared, earlier: None, ..*self };
         let tries = spread(compared.len(), CANDIDATES).into_iter();
+        let placing = some.placing(&ground.heights);
         let (_, mut start) =
-            tries.filter_map(|base| some.concentrated(&ground, base)).min_by(|a, b| a.0.total_cmp(&b.0))?;
+            tries.filter_map(|base| some.concentrated(&ground, &placing, base)).min_by(|a, b| a.0.total_cmp(&b.0))?;
         let cones = ground.cones(self.frames);
         let agreeing = std::mem::take(&mut start.agreeing);
         start.agreeing = cones.into_iter().map(|cone| [0.0, cone]).collect();
@@ -154,17 +155,17 @@ impl Rounds<'_> {
     }
 
     /// From a frame to the half that lies closest, with the sum of its distances.
-    fn concentrated(&self, ground: &Ground, base: usize) -> Option<(f64, Start)> {
+    fn concentrated(&self, ground: &Ground, placing: &[Placing], base: usize) -> Option<(f64, Start)> {
         let (mut state, heights) = ground.at(self.frames, base);
         let cones = ground.cones(self.frames);
         let half = self.frames.len() / 2 + 1;
         let mut agreeing: Vec<[f64; 2]> = cones.iter().map(|cone| [0.0, *cone]).collect();
         agreeing[base][0] = 1.0;
         let mut cost = f64::INFINITY;
-        let mut placed = self.placed(&state, &heights);
+        let mut placed = about(placing, &state);
         for round in 0..CONCENTRATIONS {
             if round > 0 && self.is_bent() {
-                placed = self.placed(&state, &heights);
+                placed = about(placing, &state);
             }
             let quadratic = self.sum(&placed, &agreeing, (&state, &heights), 1.0).quadratic();
             let system = System { quadratic: &quadratic, state: &state, inputs: self.inputs, form: self.form };
@@ -188,7 +189,8 @@ impl Rounds<'_> {
 
     fn run(&self, start: Start) -> Option<Common> {
         let Start { mut state, heights, agreeing: mut weights } = start;
-        let (mut placed, mut at) = (self.placed(&state, &heights), state.x);
+        let placing = self.placing(&heights);
+        let (mut placed, mut at) = (about(&placing, &state), state.x);
         let mut excess = 1.0;
         let mut found: Option<(Solved, Vec<f64>)> = None;
         let bent = self.is_bent();
@@ -204,7 +206,7 @@ impl Rounds<'_> {
             let std = |k: usize| best.covariance[(k, k)].sqrt();
             let away = || (0..SIZE).any(|k| (state.x[k] - at[k]).abs() > STRAIGHT * std(k));
             if round == 0 || bent && away() {
-                (placed, at) = (self.placed(&state, &heights), state.x);
+                (placed, at) = (about(&placing, &state), state.x);
             } else {
                 placed.iter_mut().for_each(|frame| frame.shift(&step));
             }
@@ -234,8 +236,8 @@ impl Rounds<'_> {
         self.inputs.bias_std[2] > BENT
     }
 
-    fn placed(&self, state: &JointState, heights: &Heights) -> Vec<Placed> {
-        self.frames.iter().map(|frame| Placed::new(frame, &Heights::of(&frame.state), (state, heights))).collect()
+    fn placing(&self, heights: &Heights) -> Vec<Placing<'_>> {
+        self.frames.iter().map(|frame| Placing::of(frame, heights)).collect()
     }
 
     /// The frames added up, each as often as it counts, and what stands before them.
@@ -260,6 +262,11 @@ impl Rounds<'_> {
         };
         placed.iter().map(one).collect()
     }
+}
+
+/// Frames about a state.
+fn about(frames: &[Placing], state: &JointState) -> Vec<Placed> {
+    frames.iter().map(|frame| frame.about(state)).collect()
 }
 
 /// Weights of a frame and of its cone by how well they agree, where frames scatter so many times more than was stated.

@@ -1,7 +1,7 @@
 //! Frames added up: what remains of frames whose own factor is not kept.
 
 use crate::fusion::heights::Heights;
-use crate::fusion::placed::Placed;
+use crate::fusion::placed::{Placed, Placing};
 use crate::fusion::start::{Ground, Start};
 use crate::fusion::sum::Shown;
 use crate::surface_fit::frame_factor::FrameFactor;
@@ -34,7 +34,7 @@ impl Earlier {
 
     /// About a common state.
     pub fn placed(&self, (state, heights): (&JointState, &Heights)) -> Placed {
-        Placed::new(&self.factor, &self.heights, (state, heights))
+        Placing::new(&self.factor, &self.heights, heights).about(state)
     }
 
     /// To start from, where they are the majority.

@@ -5,7 +5,7 @@ use crate::fusion::common::{Common, fused};
 use crate::fusion::contrast::{MOVING, contrast};
 use crate::fusion::earlier::Earlier;
 use crate::fusion::heights::Heights;
-use crate::fusion::placed::Placed;
+use crate::fusion::placed::{Placed, Placing};
 use crate::fusion::solve::System;
 use crate::fusion::sum::{Sum, repeated};
 use crate::surface_fit::frame_factor::FrameFactor;
@@ -203,6 +203,7 @@ fn step_between(
     let form = Form::default();
     let apart = MOVING.map(|k| after.state.x[k] - before.map_or(states[0].x[k], |b| b.state.x[k]));
     let mut found = None;
+    let frames: Vec<Placing> = frames.iter().map(|frame| Placing::of(frame, &all.heights)).collect();
     for _ in 0..ROUNDS {
         let one = side(&frames[..split], before, earlier, (&states[0], &all.heights));
         let other = side(&frames[split..], Some(after), None, (&states[1], &all.heights));
@@ -224,10 +225,10 @@ fn step_between(
 }
 
 /// A side's frames about a state, as often as each counts on its side.
-fn side(frames: &[FrameFactor], own: Option<&Common>, earlier: Option<&Earlier>, at: (&JointState, &Heights)) -> Sum {
+fn side(frames: &[Placing], own: Option<&Common>, earlier: Option<&Earlier>, at: (&JointState, &Heights)) -> Sum {
     let mut sum = Sum::default();
     if let Some(own) = own {
-        let placed: Vec<Placed> = frames.iter().map(|f| Placed::new(f, &Heights::of(&f.state), at)).collect();
+        let placed: Vec<Placed> = frames.iter().map(|frame| frame.about(at.0)).collect();
         let agreeing: Vec<[f64; 3]> = own.weights.iter().map(|[frame, cone]| by_kind(*frame, *cone)).collect();
         for (frame, times) in placed.iter().zip(repeated(&placed, &agreeing, &[])) {
             frame.shares.iter().for_each(|share| sum.add(share, times[share.kind as usize] / own.excess));

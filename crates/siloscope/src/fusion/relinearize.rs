@@ -86,7 +86,8 @@ impl Place {
 const GRAZING: f64 = 0.02;
 
 /// A frame's rays at the base of its equations.
-struct Straight {
+#[derive(Debug)]
+pub struct Straight {
     base: Values,
     /// Ray, part, reading and its derivative.
     rays: Vec<(Ray, Part, f64, Values)>,
@@ -158,17 +159,6 @@ impl Straight {
     fn solved(&self, right: Values) -> Values {
         self.normal.solve(&right)
     }
-}
-
-/// What of a frame's equations, made at `base` with `rays`, predicts the readings at `place` on a part, or on both: the
-/// step from the base and its derivative. `None` without rays that tell anything: the equations hold as they are.
-pub fn seen_from(
-    base: &Values,
-    rays: &[Ray],
-    (free, held): ([bool; PLACED], &Values),
-    (place, only): (&Values, Option<Part>),
-) -> Option<(Values, Map)> {
-    Straight::new(base, rays, (free, held), only).map(|frame| frame.seen_from(place))
 }
 
 fn finite(values: Values) -> Values {

@@ -30,7 +30,8 @@ pub fn spread(count: usize, most: usize) -> Vec<usize> {
 /// Where frames of a silo may be fused: their heights, and the cone of most of them.
 #[derive(Debug, Clone)]
 pub struct Ground {
-    heights: Heights,
+    /// Their heights.
+    pub heights: Heights,
     cone: Option<JointState>,
     radius: Option<f64>,
 }
