@@ -35,7 +35,7 @@ def test_calls_are_short_and_results_have_names() -> None:
 def test_classes_of_the_core_are_frozen() -> None:
     found = _core.fit_depth(depth_frame(), Priors(siloscope.sensors.load("orbbec-astra-s")))
     assert isinstance(found, _core.SurfaceFit)
-    parts: list[tuple[Any, str]] = [(found, "chi_square"), (found.factor, "step"), (found.warm_start, "oval")]
+    parts: list[tuple[Any, str]] = [(found, "chi_square"), (found.factor, "step"), (found.warm_start, "inside")]
     for one, name in [*parts, (found.coverage, "counts"), (_core.refusals()[0], "slug")]:
         for attribute in (name, "another"):
             with pytest.raises(AttributeError):

@@ -31,7 +31,7 @@ SILO = replace(scenario("silo3"), silo=Silo(1.5, 3.4, 2.0), pose=SiloPose(0.1, -
 @functools.cache
 def located(scene: Scene, sensor: str | None = "orbbec-astra-s", diameter: float | None = None) -> Estimate:
     depth = np.nan_to_num(scene.render().measured).astype(np.float32)
-    return fit_depth(depth, scene.camera, Priors(sensors.load(sensor), diameter, any_vessel=True))
+    return fit_depth(depth, scene.camera, Priors(sensors.load(sensor), diameter))
 
 
 @functools.cache

@@ -1,4 +1,4 @@
-"""A quarter of a frame's pixels: the same rays, the same answer, twice the deviation; and how `calibrate` uses it."""
+"""A quarter of a frame's pixels: the same rays, the same answer, a larger deviation; and how `calibrate` uses it."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from siloscope.simulation import ASTRA_S, Feed, Scene, discharge
 from siloscope.simulation.scenarios import scenario
 
 PROFILE = "orbbec-astra-s"
-SILO3 = replace(scenario("silo3"), sensor=ASTRA_S)
+SILO = replace(scenario("silo1"), sensor=ASTRA_S)
 
 
 @functools.cache
@@ -38,7 +38,7 @@ def test_the_thinned_camera_sees_every_second_ray(size: tuple[int, int]) -> None
 
 
 def test_an_array_is_thinned_with_the_camera_that_is_given() -> None:
-    seen = frame(SILO3)
+    seen = frame(SILO)
     assert seen.depth is not None
     few, same = decimated(seen.depth, seen.camera), decimated(seen, None)
     assert few is not None
@@ -57,13 +57,13 @@ def test_what_can_not_be_decimated() -> None:
     assert decimated("frame.png", wide) is None
 
 
-@pytest.mark.parametrize("known", [{"sensor": PROFILE}, {"diameter": 3.0}])
-def test_a_quarter_of_the_pixels_says_the_same_with_twice_the_deviation(known: dict[str, Any]) -> None:
+@pytest.mark.parametrize("known", [{"sensor": PROFILE}, {"diameter": 2.5}])
+def test_a_quarter_of_the_pixels_says_the_same_with_a_larger_deviation(known: dict[str, Any]) -> None:
     ratios = []
-    for scene in discharge(SILO3, 6, 0.4, 0.05):
+    for scene in discharge(SILO, 6, 0.4, 0.05):
         few = decimated(frame(scene), None)
         assert few is not None
-        one, other = (locate(seen, vessels="coaxial", **known) for seen in (frame(scene), few))
+        one, other = (locate(seen, intrinsics="exact", **known) for seen in (frame(scene), few))
         assert one.covariance is not None
         assert other.covariance is not None
         std = np.sqrt(np.diag(other.covariance))
@@ -71,13 +71,13 @@ def test_a_quarter_of_the_pixels_says_the_same_with_twice_the_deviation(known: d
         assert (np.abs(steps) < 3.5 * std).all()
         ratios.append(std / np.sqrt(np.diag(one.covariance)))
     if "sensor" in known:
-        assert 1.6 < np.median(ratios) < 2.8
+        assert 1.15 < np.median(ratios) < 2.8  # twice for the noise alone; the wall's form is as open as before
 
 
 @functools.cache
 def sequence() -> tuple[Frame, ...]:
-    scenes = list(discharge(SILO3, 12, 0.4, 0.05))
-    full = replace(SILO3, feed=Feed(level=1.0))
+    scenes = list(discharge(SILO, 12, 0.4, 0.05))
+    full = replace(SILO, feed=Feed(level=1.0))
     return tuple(frame(scene) for scene in [*scenes[:8], full, *scenes[8:]])
 
 

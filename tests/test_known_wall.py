@@ -6,7 +6,6 @@ import functools
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,14 +14,18 @@ import pytest
 import siloscope
 from siloscope import Calibration, Estimate, Frame, calibrate
 from siloscope.fusion.schedule import FULL_SEARCH_PERIOD
-from siloscope.simulation import ASTRA_S, Defects, Feed, Scene, discharge
+from siloscope.simulation import ASTRA_S, Defects, Feed, Scene, Silo, discharge
 from siloscope.simulation.scenarios import scenario
 from siloscope.types.pose import SiloPose
 
 PROFILE = "orbbec-astra-s"
 FEEDS = ("gaussian", "funnel", "funnel+tilted+lumpy+rathole")
-SILO3 = replace(scenario("silo3"), sensor=ASTRA_S)
-WALL = replace(SILO3, feed=Feed(level=0.1), seed=11)
+SILO = replace(scenario("silo1"), sensor=ASTRA_S)
+WALL = replace(SILO, feed=Feed(level=0.1), seed=11)
+
+
+locate = functools.partial(siloscope.locate, intrinsics="exact")
+"""Deviations of the intrinsics, which frames have in common, would hide differences."""
 
 
 @functools.cache
@@ -34,10 +37,6 @@ def frame(scene: Scene) -> Frame:
 @functools.cache
 def located(scene: Scene, sensor: str | None = PROFILE, diameter: float | None = None) -> Estimate:
     return locate(frame(scene), sensor=sensor, diameter=diameter)
-
-
-locate = partial(siloscope.locate, vessels="coaxial")
-"""In the model of a coaxial vessel: the laws of this file are those of its warm start."""
 
 
 def emptying(name: str, feed: str, steps: int = 7, defects: Defects | None = None) -> tuple[Scene, ...]:
@@ -64,10 +63,10 @@ def gap(one: Estimate, other: Estimate) -> float:
     return float(pose.max())
 
 
-@pytest.mark.parametrize("known", [{}, {"sensor": None}, {"sensor": None, "diameter": 3.0}])
+@pytest.mark.parametrize("known", [{}, {"sensor": None}, {"sensor": None, "diameter": 2.5}])
 @pytest.mark.parametrize("feed", FEEDS)
 def test_the_start_changes_no_answer_of_a_discharge(feed: str, known: dict[str, Any]) -> None:
-    scenes = emptying("silo3", feed)
+    scenes = emptying("silo1", feed)
     alone = [located(scene, **known) for scene in scenes]
     start = next(estimate for estimate in reversed(alone) if estimate.ok)
     led = [locate(frame(scene), **{"sensor": PROFILE, **known}, start=start) for scene in scenes]
@@ -76,7 +75,10 @@ def test_the_start_changes_no_answer_of_a_discharge(feed: str, known: dict[str, 
     for one, other in zip(alone, led, strict=True):
         if one.ok:
             assert parts(one) == parts(other)
-            np.testing.assert_allclose(np.diag(other.covariance), np.diag(one.covariance), rtol=0.2)
+            same = one.extra["models"][0]["model"] == other.extra["models"][0]["model"]
+            ratio = np.diag(other.covariance) / np.diag(one.covariance)
+            assert ratio.max() < 1.25
+            assert ratio.min() > 0.8 or not same  # of a cone that is known, few tiles tell something
             gaps.append(gap(one, other))
     assert max(gaps) < 0.35
     assert np.median(gaps) < 0.1
@@ -92,7 +94,7 @@ def test_a_frame_that_was_not_searched_took_the_short_way() -> None:
 
 @pytest.mark.parametrize(("d_rx", "d_tx"), [(0.3, 0.0), (0.02, 0.0), (0.0, 0.3), (-0.1, -0.15)])
 def test_a_moved_camera_is_searched_for(d_rx: float, d_tx: float) -> None:
-    pose = SILO3.pose
+    pose = SILO.pose
     moved = replace(WALL, pose=SiloPose(pose.r_x + d_rx, pose.r_y, pose.t_x + d_tx, pose.t_y), seed=13)
     led = locate(frame(moved), sensor=PROFILE, start=located(WALL))
     assert is_searched(led, located(moved))
@@ -101,10 +103,10 @@ def test_a_moved_camera_is_searched_for(d_rx: float, d_tx: float) -> None:
 
 @pytest.mark.parametrize("shift", [0.0005, 0.003])
 def test_a_camera_moved_by_millimetres_is_measured_where_it_is(shift: float) -> None:
-    pose = SILO3.pose
+    pose = SILO.pose
     moved = replace(WALL, pose=SiloPose(pose.r_x, pose.r_y + shift / 3.0, pose.t_x + shift, pose.t_y), seed=13)
     led = locate(frame(moved), sensor=PROFILE, start=located(WALL))
-    assert gap(located(moved), led) < 0.1
+    assert gap(located(moved), led) < 0.2
 
 
 @pytest.mark.parametrize("name", ["brim-full", "flat-wall", "room-corner", "square-shaft", "sphere", "noise"])
@@ -114,12 +116,14 @@ def test_what_is_refused_is_refused_for_the_same_reason(name: str) -> None:
     assert locate(frame(scene), sensor=PROFILE, start=located(WALL)).reason == located(scene).reason
 
 
-def test_a_part_that_comes_into_view_or_goes_is_searched_for() -> None:
-    high, low = (replace(scenario("silo1"), sensor=ASTRA_S, feed=Feed(level=level)) for level in (0.4, 0.02))
+def test_a_part_that_comes_into_view_or_goes_is_seen_so() -> None:
+    steep = replace(scenario("silo1"), silo=Silo(1.25, 3.0, 1.6), sensor=ASTRA_S)  # no feed lies as steep as its cone
+    high, low = (replace(steep, feed=Feed(level=level)) for level in (0.6, 0.1))
     assert parts(located(high)) != parts(located(low))
     for scene, other in ((high, low), (low, high)):
         led = locate(frame(scene), sensor=PROFILE, start=located(other))
-        assert is_searched(led, located(scene))
+        assert parts(led) == parts(located(scene))
+        assert gap(located(scene), led) < 0.2
 
 
 def test_an_oval_wall_stays_oval() -> None:
@@ -131,11 +135,11 @@ def test_an_oval_wall_stays_oval() -> None:
         assert led.extra["fit"]["ovality"] == pytest.approx(located(again).extra["fit"]["ovality"], rel=0.05)
 
 
-def test_a_rough_wall_is_searched_for_where_the_depths_bend_is_not_known() -> None:
+def test_a_rough_wall_is_the_same_where_the_depths_bend_is_not_known() -> None:
     rough = replace(WALL, defects=Defects(ovality=0.008, upright_seams=8, dents=5, bolts=20, seam_spacing=1.2))
     first, again = located(rough, sensor=None), located(replace(rough, seed=22), sensor=None)
     led = locate(frame(replace(rough, seed=22)), start=first)
-    assert is_searched(led, again)
+    assert gap(again, led) < 0.35
 
 
 def test_a_start_that_tells_no_wall_is_no_start() -> None:
@@ -155,9 +159,9 @@ def ruined(scene: Scene) -> Frame:
 @functools.cache
 def sequence() -> tuple[Frame, ...]:
     """A discharge with lids in between, and a camera that moves in the middle of it."""
-    pose = SILO3.pose
-    moved = replace(SILO3, pose=SiloPose(pose.r_x + 0.02, pose.r_y, pose.t_x + 0.03, pose.t_y), seed=77)
-    scenes = [*discharge(SILO3, 20, 0.45, 0.25), *discharge(moved, 28, 0.25, 0.02)]
+    pose = SILO.pose
+    moved = replace(SILO, pose=SiloPose(pose.r_x + 0.02, pose.r_y, pose.t_x + 0.03, pose.t_y), seed=77)
+    scenes = [*discharge(SILO, 20, 0.45, 0.25), *discharge(moved, 28, 0.25, 0.02)]
     frames = [frame(scene) for scene in scenes]
     for number in (0, 5, 32, 33):
         frames[number] = ruined(scenes[number])
@@ -165,7 +169,7 @@ def sequence() -> tuple[Frame, ...]:
 
 
 def fused(frames: Sequence[Frame | Estimate], jobs: int = 1) -> Calibration:
-    return calibrate(frames, sensor=PROFILE, jobs=jobs)
+    return calibrate(frames, sensor=PROFILE, jobs=jobs, intrinsics="exact")
 
 
 def test_the_jobs_change_nothing() -> None:
@@ -182,8 +186,8 @@ def test_a_calibration_says_what_its_frames_say_from_nothing(monkeypatch: pytest
         sys.modules["siloscope.fusion.schedule"], "FULL_RES_FRAMES", len(sequence())
     )  # a quarter says less
     distinct = {frame.digest: frame for frame in sequence()}.values()  # a frame given twice counts once
-    each = [siloscope.locate(frame, sensor=PROFILE) for frame in distinct]  # in the model that frames are fused in
-    alone, found = calibrate(each), fused(sequence())
+    each = [locate(frame, sensor=PROFILE) for frame in distinct]
+    alone, found = calibrate(each, intrinsics="exact"), fused(sequence())
     assert [record.status for record in found.frames] == [record.status for record in alone.frames]
     assert [move.index for move in found.moves] == [move.index for move in alone.moves] == [19]
     assert found.parameters is not None
@@ -195,30 +199,10 @@ def test_a_calibration_says_what_its_frames_say_from_nothing(monkeypatch: pytest
     np.testing.assert_allclose(np.diag(found.parameter_covariance), std**2, rtol=0.05)
 
 
-def test_a_calibration_of_a_coaxial_vessel_says_so_and_goes_on_with_it() -> None:
-    told = calibrate(sequence()[1:5], sensor=PROFILE, vessels="coaxial")
-    more = calibrate(sequence()[6:8], continue_from=told)
-    assert told.config["vessels"] == more.config["vessels"] == "coaxial"
-    assert more.counts["used"] == 6
-    alone = calibrate([locate(each, sensor=PROFILE) for each in sequence()[1:5]])
-    assert gap_of_poses(told, alone) < 0.1
-    with pytest.raises(siloscope.errors.UsageError, match="vessels"):
-        calibrate(sequence()[1:2], vessels="round")
-
-
-def gap_of_poses(one: Calibration, other: Calibration) -> float:
-    assert one.pose is not None
-    assert other.pose is not None
-    assert one.covariance is not None
-    steps = [getattr(one.pose, name) - getattr(other.pose, name) for name in ("r_x", "r_y", "t_x", "t_y")]
-    return float((np.abs(steps) / np.sqrt(np.diag(one.covariance))).max())
-
-
 def test_most_frames_are_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     searched: list[bool] = []
 
     def watched(*given: Any, **named: Any) -> Estimate:
-        named["vessels"] = "coaxial"
         estimate = locate(*given, **named)
         searched.append(is_searched(estimate, locate(*given, **{**named, "start": None})))
         return estimate
@@ -226,5 +210,5 @@ def test_most_frames_are_not_searched(monkeypatch: pytest.MonkeyPatch) -> None:
     calibrating = sys.modules["siloscope.calibrate"]
     monkeypatch.setattr(calibrating, "locate", watched)
     runs = 2
-    fused([frame(scene) for scene in discharge(SILO3, runs * FULL_SEARCH_PERIOD, 0.2, 0.1)])
+    fused([frame(scene) for scene in discharge(SILO, runs * FULL_SEARCH_PERIOD, 0.2, 0.1)])
     assert searched.count(True) == runs

@@ -61,7 +61,7 @@ def validated(frames: Any, camera: Camera = SMALL, **more: Any) -> Any:
 
 @cache
 def seen() -> tuple[SeenFrame, ...]:
-    asked = Asked.of(PROFILE, camera=SMALL, depth_unit=None, diameter=None, intrinsics="exact", vessels="any")
+    asked = Asked.of(PROFILE, camera=SMALL, depth_unit=None, diameter=None, intrinsics="exact")
     return read(depths(), asked).seen
 
 
@@ -212,7 +212,7 @@ def test_levels_have_every_frame_once_and_the_fullest_first() -> None:
 
 
 def test_of_many_frames_some_are_asked_evenly() -> None:
-    asked = Asked.of(PROFILE, camera=SMALL, depth_unit=None, diameter=None, intrinsics="exact", vessels="any")
+    asked = Asked.of(PROFILE, camera=SMALL, depth_unit=None, diameter=None, intrinsics="exact")
     frames = (Frame(depth=depths()[-1], camera=SMALL, source=str(number)) for number in range(2 * MOST_FRAMES + 21))
     found = read(frames, asked)
     assert found.every == 2

@@ -50,7 +50,6 @@ def calibrate(
     gravity: ArrayLike | None = None,
     bottom: str | None = None,
     intrinsics: str | IntrinsicsStd | None = None,
-    vessels: str | None = None,
     continue_from: Calibration | Pathlike | None = None,
     rule: str = "information",
     jobs: int = 1,
@@ -75,8 +74,6 @@ def calibrate(
         counts as the bottom only if it is steeper than feed can lie.
     intrinsics : {"exact", "calibrated", "nominal"} or IntrinsicsStd, optional
         How exactly the camera's intrinsics are known, as for `locate`.
-    vessels : {"any", "coaxial"}, optional
-        Which vessels may be in view, as for `locate`; those of the earlier calibration, else "any".
     continue_from : Calibration or path, optional
         An earlier calibration of the same camera and silo; its frames come before these. A frame that it has counted
         is known by its measurements and does not count again.
@@ -107,9 +104,7 @@ def calibrate(
         raise UsageError(f"jobs {jobs} is not between 1 and 256; give the number of frames to locate at a time")
     start = time.perf_counter()
     before = Calibration.load(continue_from) if isinstance(continue_from, str | PathLike) else continue_from
-    settings = settings_of(
-        before, sensor=sensor, diameter=diameter, gravity=gravity, intrinsics=intrinsics, vessels=vessels
-    )
+    settings = settings_of(before, sensor=sensor, diameter=diameter, gravity=gravity, intrinsics=intrinsics)
     source = given_frames(frames, camera, depth_unit)
     one = FrameLocator(partial(locate, trust=tuple(sorted(trusted(trust)))), camera, depth_unit, settings)
     ahead = 0 if jobs == 1 else 2 * jobs

@@ -46,7 +46,6 @@ def locate(
     start: Estimate | None = None,
     ratios: bool = True,
     intrinsics: str | IntrinsicsStd | None = None,
-    vessels: str = "any",
     trust: str | Sequence[str] = (),
 ) -> Estimate:
     """Find the silo's axis in one frame, and with it the camera's pose (Eqs. 5–7).
@@ -90,9 +89,6 @@ def locate(
     intrinsics : {"exact", "calibrated", "nominal"} or IntrinsicsStd, optional
         How exactly the intrinsics are known (method ``surface``): "calibrated" where a camera is given or recorded,
         "nominal" where the sensor profile's own are used.
-    vessels : {"any", "coaxial"}
-        Which vessels may be in view (method ``surface``, depth images from inside): those of the joint fit, which
-        compete, or a cylinder on a coaxial cone seen through exact intrinsics, the model in which frames are fused.
     trust : str or sequence of {"range", "camera", "bias", "diameter", "gravity"}
         What to go by although it contradicts the sensor's profile or the frame by more than 5 standard deviations;
         the contradiction then is a warning in `Estimate.quality`, where it would be a refusal.
@@ -116,6 +112,7 @@ def locate(
     settings = Settings.checked(
         profile,
         diameter=known.sheet.diameter,
+        told_cone=known.sheet.bottom == "cone" or bool(known.sheet.cone),
         gravity=gravity,
         grid=grid,
         neighbours=neighbours,
@@ -123,7 +120,6 @@ def locate(
         start=start,
         ratios=ratios,
         intrinsics=intrinsics,
-        vessels=vessels,
         trust=trust,
     )
     data = given_frame(data, camera, depth_unit)

@@ -133,9 +133,8 @@ def measure(
         placed = PlacedPose.of(pose, pose_std, calibration)
         return replace(outlined(prepared, placed, about, profile, chosen, source_of(data)), moisture=moisture)
     if calibration is None:
-        vessels = "coaxial" if sheet.bottom == "cone" or sheet.cone else "any"  # a cone that is told is not asked for
-        estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, diameter=sheet.diameter, mask=mask,
-                          vessels=vessels, intrinsics=intrinsics, trust=trust)  # fmt: skip
+        estimate = locate(data, camera, sensor=profile, depth_unit=depth_unit, vessel=about, mask=mask,
+                          intrinsics=intrinsics, trust=trust)  # fmt: skip
         silo = calibrate([estimate], sensor=profile, diameter=sheet.diameter) if estimate.ok else None
         if silo is None or not silo.ok:
             return unlocated(data, estimate if silo is None else silo, source_of(data))

@@ -7,7 +7,7 @@ use pyo3::prelude::*;
 use siloscope::geometry::depth_image::{Depth, DepthImage};
 use siloscope::geometry::sensor::{DepthBias, DepthError, NoiseLaw};
 use siloscope::shape_tensor::instrument::SensorErrors;
-use siloscope::surface_fit::{Knowledge, Vessels};
+use siloscope::surface_fit::Knowledge;
 use siloscope::{Camera, Vec3};
 use std::borrow::Cow;
 
@@ -37,8 +37,9 @@ pub struct Priors {
     diameter_std: f64,
     gravity: Option<[f64; 3]>,
     gravity_std: f64,
-    any_vessel: bool,
     camera_std: [f64; 5],
+    told_cone: bool,
+    judged: bool,
 }
 
 impl Priors {
@@ -55,7 +56,9 @@ impl Priors {
             error: DepthError { bias: depth_bias(bias), bias_std, noise: noise.map(noise_law) },
             radius: self.diameter.map(|diameter| (diameter / 2.0, self.diameter_std / 2.0)),
             gravity: self.gravity.map(|gravity| (Vec3::from(gravity), self.gravity_std)),
-            vessels: if self.any_vessel { Vessels::Any { camera_std: self.camera_std } } else { Vessels::Coaxial },
+            camera_std: self.camera_std,
+            told_cone: self.told_cone,
+            judged: self.judged,
         }
     }
 }

@@ -26,10 +26,10 @@ def priors_of(frame: Prepared, settings: Settings) -> Priors:
     if isinstance(frame, PreparedPoints):
         return Priors(CLOUD, settings.diameter, settings.gravity)
     profile = settings.profile if frame.turn is None else replace(settings.profile, map=None)  # no image, no map
-    priors = Priors(profile, settings.diameter, settings.gravity)
-    if settings.vessels != "any":
-        return priors
-    return replace(priors, any_vessel=True, camera_std=settings.intrinsics_std(frame).of_rays(frame.camera))
+    camera_std = settings.intrinsics_std(frame).of_rays(frame.camera)
+    return Priors(
+        profile, settings.diameter, settings.gravity, camera_std=camera_std, told_cone=settings.told_cone
+    )
 
 
 def _surface(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:

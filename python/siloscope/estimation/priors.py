@@ -37,10 +37,12 @@ class Priors:
     """(3,) direction of gravity in the camera frame, any length."""
     diameter_std: float = DIAMETER_STD
     gravity_std: float = GRAVITY_STD
-    any_vessel: bool = False
-    """Whether vessel models compete; else the vessel is a cylinder on a coaxial cone, seen through exact intrinsics."""
     camera_std: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 0.0, 0.0)
     """Standard deviations of fx and fy (relative), of cx and cy in units of the rays, and of k1; 0 where exact."""
+    told_cone: bool = False
+    """Whether the vessel is said to end in a cone about its own axis: then one that is seen alone has that axis."""
+    judged: bool = True
+    """Whether an answer that is no vessel's or not sure is refused; else it is given, to tell what is wrong with it."""
 
     @property
     def tilt(self) -> SiloPose | None:

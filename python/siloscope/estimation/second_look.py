@@ -45,7 +45,7 @@ def looked_at_again(
         return estimate, [*said, *_another_camera(estimate, prepared, settings)]
     for remark, free in without_priors(run, prepared, settings, estimate.config):
         return free, [remark]
-    if settings.vessels == "any" and settings.start is None:
+    if settings.start is None:
         return estimate, list(other_readings(run, prepared, settings, estimate.config))
     return estimate, []
 

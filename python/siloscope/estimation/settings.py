@@ -22,9 +22,6 @@ Number = float | None
 RAY_STD = 0.002
 """Direction of the rays of a cloud that is no camera's, rad: as a pixel of a calibrated camera."""
 
-VESSELS = ("any", "coaxial")
-"""Which vessels may be in view."""
-
 
 @dataclass(frozen=True)
 class Settings:
@@ -39,9 +36,10 @@ class Settings:
     start: Estimate | None
     ratios: bool
     intrinsics: str | IntrinsicsStd | None
-    vessels: str
     trust: frozenset[str] = frozenset()
     """Codes of contradictions that only warn."""
+    told_cone: bool = False
+    """Whether the vessel is said to end in a cone about its own axis."""
     gravity_given: bool = False
     """Whether gravity is the caller's, not the frame's own."""
     gravity_is_behind: bool = False
@@ -60,8 +58,8 @@ class Settings:
         start: Estimate | None,
         ratios: bool,
         intrinsics: str | IntrinsicsStd | None,
-        vessels: str,
         trust: str | Sequence[str] = (),
+        told_cone: bool = False,
     ) -> Settings:
         """Raises `UsageError` for a setting outside its bounds."""
         return cls(
@@ -74,8 +72,8 @@ class Settings:
             start,
             ratios,
             intrinsics if isinstance(intrinsics, IntrinsicsStd | None) else _one_of("intrinsics", intrinsics, NAMES),
-            _one_of("vessels", vessels, VESSELS),
             trusted(trust),
+            told_cone,
         )
 
     def with_gravity_of(self, prepared: Prepared) -> Settings:
@@ -97,7 +95,7 @@ class Settings:
 
     def intrinsics_std(self, frame: Prepared) -> IntrinsicsStd:
         """How exactly the intrinsics of a frame are known; of a cloud's rays as of a calibrated camera's."""
-        if self.vessels == "coaxial" or frame.camera is None:
+        if frame.camera is None:
             return EXACT
         if isinstance(self.intrinsics, IntrinsicsStd):
             return self.intrinsics
@@ -120,7 +118,6 @@ class Settings:
             "neighbours": self.neighbours,
             "threads": self.threads,
             "camera": prepared.camera.to_dict() if isinstance(prepared, PreparedDepth) else None,
-            "vessels": self.vessels,
             "intrinsics_std": self.intrinsics_std(prepared).to_dict() if isinstance(prepared, PreparedDepth) else None,
             **prepared.config,
         }

@@ -51,7 +51,8 @@ def fit_depth(
     found = _core.fit_depth(frame, priors, wall, ratios)
     if isinstance(found, _core.Refusal):
         return refused("surface", found, config)
-    return _estimate(found, priors, config, PixelLabels(found, frame))
+    more = None if found.inside else sensor_covariance(found, SensorStd((0.0, 0.0, 0.0), priors.camera_std))
+    return _estimate(found, priors, config, PixelLabels(found, frame), more)
 
 
 def fit_points(

@@ -58,7 +58,6 @@ class FrameLocator:
         common, unit = self.settings, self.depth_unit
         known: dict[str, Any] = {"diameter": common.diameter, "gravity": common.gravity, "depth_unit": unit}
         known |= {"sensor": common.profile, "start": start, "ratios": False, "intrinsics": common.intrinsics}
-        known["vessels"] = common.vessels
         few = self._decimated(frame, known) if number >= FULL_RES_FRAMES else None
         return few or self.locate(frame, self.camera, **known)
 

@@ -24,26 +24,21 @@ class Settings:
     diameter: float | None
     gravity: ArrayLike | None
     intrinsics: str | IntrinsicsStd | None = None
-    vessels: str = "any"
-    """Which vessels may be in view; a calibration of frames of a coaxial one goes on with that."""
 
     def described(self) -> dict[str, Any]:
         """For the result's ``config``, and to be gone on with."""
         down = None if self.gravity is None else [float(g) for g in np.ravel(np.asarray(self.gravity, float))]
         exact = self.intrinsics.to_dict() if isinstance(self.intrinsics, IntrinsicsStd) else self.intrinsics
-        told = {"sensor": self.profile.to_dict(), "diameter": self.diameter, "gravity": down, "intrinsics": exact}
-        return {**told, "vessels": self.vessels}
+        return {"sensor": self.profile.to_dict(), "diameter": self.diameter, "gravity": down, "intrinsics": exact}
 
 
 def settings_of(before: Calibration | None, **given: Any) -> Settings:
     """The caller's settings; those of the earlier calibration where the caller says nothing."""
     profile = sensors.load(given["sensor"])
-    vessels = given["vessels"]
-    mine = Settings(profile, given["diameter"], given["gravity"], given["intrinsics"], vessels or "any")
+    mine = Settings(profile, given["diameter"], given["gravity"], given["intrinsics"])
     if before is None or not before.config:
         return mine
     earlier = before.config
-    mine = replace(mine, vessels=vessels or earlier.get("vessels") or "any")
     if given["sensor"] is None:
         mine = replace(mine, profile=_profile(earlier.get("sensor")))
     if given["diameter"] is None:
@@ -82,7 +77,7 @@ def brought_settings(answers: list[LocatedFrame]) -> dict[str, Any]:
     configs = [answer.estimate.config for answer in answers if answer.estimate is not None and not answer.made]
     if not configs or len(configs) < len(answers):
         return {}
-    common = {name: [config.get(name) for config in configs] for name in ("sensor", "diameter", "vessels")}
+    common = {name: [config.get(name) for config in configs] for name in ("sensor", "diameter")}
     return {name: told[0] for name, told in common.items() if told[0] is not None and all(v == told[0] for v in told)}
 
 

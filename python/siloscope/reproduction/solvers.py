@@ -24,15 +24,15 @@ class Solver:
     """Side of the voxels in radii of the silo; None for the method's own."""
 
     def __call__(self, frame: SimulatedFrame, profile: SensorProfile, **more: Any) -> Estimate:
-        """The pose of a frame taken with a sensor of this profile; the paper's silos are known to be coaxial."""
-        known: dict[str, Any] = dict(more)
+        """The pose of a frame taken with a sensor of this profile; the intrinsics are known exactly."""
+        known: dict[str, Any] = {"intrinsics": "exact", **more}
         if self.knows_diameter:
             known["diameter"] = 2.0 * frame.scene.silo.radius
         if self.knows_profile:
             known["sensor"] = profile
         if self.grid_per_radius is not None:
             known["grid"] = self.grid_per_radius * frame.scene.silo.radius
-        return locate(frame.measured, frame.camera, method=self.method, vessels="coaxial", **known)
+        return locate(frame.measured, frame.camera, method=self.method, **known)
 
 
 SOLVERS = {

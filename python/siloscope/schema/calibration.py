@@ -204,7 +204,6 @@ class Config(Document):
 
     diameter: Annotated[float, BeforeValidator(finite), AfterValidator(_diameter)] | None = None
     intrinsics: Annotated[Any, PlainValidator(_intrinsics)] = None
-    vessels: Literal["any", "coaxial"] | None = None
     gravity: Annotated[Array, vector(3)] | None = None
     sensor: SensorRecord | None = None
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from siloscope import _core, sensors
 from siloscope.errors import InputError
+from siloscope.estimation import surface
 from siloscope.estimation.inputs import PreparedDepth, prepare
 from siloscope.estimation.methods import priors_of
 from siloscope.estimation.priors import Priors
@@ -44,7 +45,7 @@ class SeenFrame:
     shown: NDArray[np.bool_]
     """Which of its tiles show the wall by its own answer."""
     refused: str | None = None
-    """Why the vessels of the joint fit gave no answer; the estimate then is that of an ideal coaxial one."""
+    """Why the frame has no answer that stands; the estimate then is the one that was refused."""
 
     @property
     def shows_vessels_cone(self) -> bool:
@@ -71,14 +72,13 @@ class Asked:
     profile: SensorProfile
     diameter: float | None
     intrinsics: str | IntrinsicsStd | None
-    vessels: str
 
     @classmethod
     def of(cls, sensor: Any, **given: Any) -> Asked:
         """With a sensor's profile, its name or file; raises `UsageError` for one that is none."""
         return cls(profile=sensors.load(sensor), **given)
 
-    def located(self, frame: Any, vessels: str, start: Estimate | None) -> Estimate:
+    def located(self, frame: Any, start: Estimate | None) -> Estimate:
         """The frame's own answer."""
         return locate(
             frame,
@@ -87,7 +87,6 @@ class Asked:
             depth_unit=self.depth_unit,
             diameter=self.diameter,
             intrinsics=self.intrinsics,
-            vessels=vessels,
             start=start,
             ratios=False,
         )
@@ -102,7 +101,7 @@ class Asked:
             raise InputError("a cloud that was not seen from one place has no image to be validated by; give images")
         settings = Settings.checked(
             self.profile, diameter=self.diameter, gravity=None, grid=None, neighbours=6, threads=1, start=None,
-            ratios=False, intrinsics=self.intrinsics, vessels="any",
+            ratios=False, intrinsics=self.intrinsics,
         )  # fmt: skip
         return DepthFrame(made.depth, made.camera, made.camera.rays()), priors_of(made, settings)
 
@@ -125,8 +124,8 @@ MOST_FRAMES = 40
 def read(frames: Iterable[Any], asked: Asked) -> Reading:
     """Locates frames, from where the first one has shown the wall; of many frames some, evenly spread.
 
-    A frame that the joint fit refuses is tried as an ideal coaxial vessel: what is wrong with it shall be told, and not
-    only that something is.
+    An answer that is refused is looked at all the same, where a wall of revolution is seen: what is wrong with it shall
+    be told, and not only that something is.
     """
     seen: list[SeenFrame] = []
     without: list[tuple[str, str]] = []
@@ -155,9 +154,10 @@ def _located(name: str, frame: Any, asked: Asked, start: Estimate | None) -> See
     """A frame with its answer, or why it has none."""
     depth, priors = asked.prepared(frame)
     refused = None
-    answer = first = asked.located(frame, asked.vessels, start)
+    answer = first = asked.located(frame, start)
     if not first.ok:
-        refused, answer = first.reason, asked.located(frame, "coaxial", None)
+        refused, unjudged = first.reason, replace(priors, judged=False)
+        answer = surface.fit_depth(depth.depth, depth.camera, unjudged, ratios=False, config=first.config)
     if answer.details is None or answer.evidence is None:
         return refused or "refused"
     shown = np.isfinite(answer.details.residuals)

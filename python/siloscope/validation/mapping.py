@@ -114,9 +114,7 @@ def sensor_map(
     UsageError
         For an unknown sensor.
     """
-    asked = Asked.of(
-        sensor, camera=camera, depth_unit=depth_unit, diameter=diameter, intrinsics=intrinsics, vessels="any"
-    )
+    asked = Asked.of(sensor, camera=camera, depth_unit=depth_unit, diameter=diameter, intrinsics=intrinsics)
     asked = replace(asked, profile=replace(asked.profile, map=None))
     seen = read(frames, asked).seen
     if len(seen) < FEWEST_FRAMES:

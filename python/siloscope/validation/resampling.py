@@ -108,7 +108,7 @@ def _solved(frames: Sequence[_Exact], asked: Asked) -> tuple[NDArray[np.float64]
     """Pose and its deviations from all frames; None where they give no answer."""
     start, seen = None, []
     for one in frames:
-        estimate = replace(asked, depth_unit=None).located(one.frame, asked.vessels, start)
+        estimate = replace(asked, depth_unit=None).located(one.frame, start)
         start = start or (estimate if estimate.ok else None)
         if estimate.ok:
             seen.append(estimate)

@@ -93,13 +93,7 @@ def _split(
 
 def calibrated(answers: Sequence[Estimate], asked: Asked) -> Calibration:
     """Frames' own answers fused."""
-    return calibrate(
-        answers,
-        sensor=asked.profile,
-        diameter=asked.diameter,
-        intrinsics=asked.intrinsics,
-        vessels=asked.vessels,
-    )
+    return calibrate(answers, sensor=asked.profile, diameter=asked.diameter, intrinsics=asked.intrinsics)
 
 
 def wall_of(parameters: Vector) -> Wall:

@@ -124,7 +124,6 @@ def validate(
     depth_unit: float | None = None,
     diameter: float | None = None,
     intrinsics: str | IntrinsicsStd | None = None,
-    vessels: str = "any",
     resamples: int = RESAMPLES,
     seed: int = 0,
     progress: Progress | None = None,
@@ -139,7 +138,7 @@ def validate(
     ----------
     frames : files, frame source, or iterable of Frame or depth array
         As for `calibrate`, of one camera that hangs still. Of more than 80 frames some are asked, evenly spread.
-    camera, sensor, depth_unit, diameter, intrinsics, vessels
+    camera, sensor, depth_unit, diameter, intrinsics
         As for `calibrate`. An error of the intrinsics within their stated deviations is none.
     resamples : int
         How often the solve is repeated with other noise; 0 for not at all.
@@ -162,9 +161,7 @@ def validate(
     """
     if not 0 <= resamples <= 1000:
         raise UsageError(f"resamples {resamples} is not between 0 and 1000; give how often the solve is repeated")
-    asked = Asked.of(
-        sensor, camera=camera, depth_unit=depth_unit, diameter=diameter, intrinsics=intrinsics, vessels=vessels
-    )
+    asked = Asked.of(sensor, camera=camera, depth_unit=depth_unit, diameter=diameter, intrinsics=intrinsics)
     source = given_frames(frames, camera, depth_unit)
     reading = read(progress(source, "locating") if progress else source, asked)
     config = _config(asked, reading)
@@ -201,7 +198,6 @@ def _config(asked: Asked, reading: Reading) -> dict[str, Any]:
     return {
         "sensor": asked.profile.to_dict(),
         "diameter": asked.diameter,
-        "vessels": asked.vessels,
         "camera": seen[0].frame.camera.to_dict() if seen else None,
         "intrinsics_std": seen[0].estimate.config.get("intrinsics_std") if seen else None,
     }

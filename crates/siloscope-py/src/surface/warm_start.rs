@@ -11,13 +11,13 @@ use siloscope::surface_fit::warm_start::KnownWall;
 #[derive(Clone, Copy)]
 pub struct WarmStart(pub KnownWall);
 
-/// Wall, bias, model error, inside, oval: the arguments of `WarmStart`.
-type State = ([f64; 7], [f64; 3], f64, bool, bool);
+/// Wall, bias, model error, inside: the arguments of `WarmStart`.
+type State = ([f64; 7], [f64; 3], f64, bool);
 
 impl WarmStart {
-    fn bits(&self) -> ([u64; 7], [u64; 3], u64, bool, bool) {
-        let (wall, bias, error, inside, oval) = self.__getnewargs__();
-        (wall.map(f64::to_bits), bias.map(f64::to_bits), error.to_bits(), inside, oval)
+    fn bits(&self) -> ([u64; 7], [u64; 3], u64, bool) {
+        let (wall, bias, error, inside) = self.__getnewargs__();
+        (wall.map(f64::to_bits), bias.map(f64::to_bits), error.to_bits(), inside)
     }
 }
 
@@ -30,7 +30,7 @@ impl PartialEq for WarmStart {
 #[pymethods]
 impl WarmStart {
     #[new]
-    fn new(wall: [f64; 7], bias: [f64; 3], model_error_std: f64, inside: bool, oval: bool) -> Self {
+    fn new(wall: [f64; 7], bias: [f64; 3], model_error_std: f64, inside: bool) -> Self {
         let [r_x, r_y, t_x, t_y, radius, slope, apex] = wall;
         let surface = SiloSurface {
             pose: SiloPose { r_x, r_y, t_x, t_y },
@@ -38,7 +38,7 @@ impl WarmStart {
             cone: Some(Cone { slope, apex }).filter(|cone| !cone.slope.is_nan()),
             ovality: [0.0; 2],
         };
-        Self(KnownWall { surface, bias: depth_bias(bias), inside, misfit: model_error_std, oval })
+        Self(KnownWall { surface, bias: depth_bias(bias), inside, misfit: model_error_std })
     }
 
     /// r_x, r_y, t_x, t_y, radius, slope of the cone and z of its vertex; NaN for a part that was not seen.
@@ -67,19 +67,13 @@ impl WarmStart {
         self.0.inside
     }
 
-    /// Whether the frame's pixels showed that it is oval.
-    #[getter]
-    fn oval(&self) -> bool {
-        self.0.oval
-    }
-
     fn __getnewargs__(&self) -> State {
-        (self.wall(), self.bias(), self.0.misfit, self.0.inside, self.0.oval)
+        (self.wall(), self.bias(), self.0.misfit, self.0.inside)
     }
 
     fn __repr__(&self) -> String {
-        let (wall, bias, error, inside, oval) = self.__getnewargs__();
+        let (wall, bias, error, inside) = self.__getnewargs__();
         let side = if inside { "inside" } else { "outside" };
-        format!("WarmStart(wall={wall:.6?}, bias={bias:.6?}, model_error_std={error:.6}, {side}, oval={oval})")
+        format!("WarmStart(wall={wall:.6?}, bias={bias:.6?}, model_error_std={error:.6}, {side})")
     }
 }

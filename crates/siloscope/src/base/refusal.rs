@@ -106,7 +106,7 @@ impl Refusal {
             Self::ConeAlone => (
                 "cone-alone",
                 "only a cone is in view; it may be oblique, or feed, and its axis need not be the silo's",
-                "turn the camera so that cylinder wall is in view, or give gravity",
+                "turn the camera so that cylinder wall is in view, give gravity, or say that the silo ends in a cone",
             ),
             Self::Deformed => (
                 "deformed-wall",

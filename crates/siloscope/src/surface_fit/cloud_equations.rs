@@ -5,11 +5,13 @@
 
 use crate::Vec3;
 use crate::geometry::evaluator::SurfaceEvaluator;
+use crate::geometry::parameters::Parameters;
 use crate::geometry::surface::{Part, SiloSurface};
 use crate::stats::robust::{MAD_TO_STD, upper_median};
 use crate::surface_fit::equation::{Equation, TileEquation};
-use crate::surface_fit::solver::{Fit, Problem};
+use crate::surface_fit::solver::{Fit, Prior, Problem};
 use crate::surface_fit::tiles::{DOWN, NONE, Patch, Patches, RIGHT};
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
@@ -31,14 +33,16 @@ type Near = (usize, f64, bool);
 type Place = (bool, i64, i64);
 
 /// What of a cloud lies near the wall that was found on its voxels.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct CloudWall<'a> {
     /// The points, camera frame, metres.
-    pub points: &'a [Vec3],
+    pub points: Cow<'a, [Vec3]>,
     /// For each whether its voxel is wall.
     pub on_wall: &'a [bool],
     /// Side of a tile, metres; points further from the surface are left out.
     pub grid: f64,
+    /// Whether a camera in the origin has seen it, along whose rays the points scatter.
+    pub by_rays: bool,
 }
 
 /// The wall in tiles of a surface, and the mean distance of each one's points from it, metres.
@@ -97,8 +101,12 @@ impl CloudWall<'_> {
             total += distance - middle;
             squares += (distance - middle).powi(2);
         }
-        let (origin, about) = (sum / count, squares - total * total / count);
+        let (mut origin, about) = (sum / count, squares - total * total / count);
         let outwards = placed.surface.pose.rotation().transpose() * placed.local(&origin).gradient.normalize();
+        if self.by_rays {
+            // on the wall, derivatives do not carry the points' own noise
+            origin -= origin * ((middle + total / count) / outwards.dot(&origin));
+        }
         let normal = if outwards.dot(&origin) > 0.0 { -outwards } else { outwards };
         let scatter = (about / f64::max(count - 1.0, 1.0)).max(0.0).sqrt();
         let (q, tile) = (normal, (0, 0));
@@ -125,6 +133,18 @@ fn arranged(found: Vec<(Place, (Patch, f64))>, sectors: [f64; 2]) -> WallTiles {
     tiles
 }
 
+/// Derivative of a tile's distance from the wall by the depth bias, where that is not known and a camera in the origin has
+/// seen it.
+fn by_bias(prior: &Prior, fit: &Fit, placed: &SurfaceEvaluator, seen: &Patch) -> Parameters {
+    let mut row = Parameters::zeros();
+    if prior.bias_std != [0.0; 3] {
+        let (at, d) = (placed.local(&seen.origin), seen.origin.z);
+        let rate = at.gradient.normalize().dot(&placed.turn(&(seen.origin / d))) / fit.bias.slope(d);
+        (row[7], row[8], row[9]) = (-rate, -rate * d, -rate * d * d);
+    }
+    row
+}
+
 impl WallTiles {
     /// An equation for each tile.
     pub fn equations(&self, problem: &Problem, fit: &Fit) -> Vec<TileEquation> {
@@ -137,13 +157,11 @@ impl WallTiles {
             let single = (squares / (freedom + USUAL)).max(FINEST * FINEST);
             let (noise, spread) = (single / seen.count, 1.0 / equation.cosine);
             let residual = *self.distances.get(patch)?;
+            let jacobian = equation.jacobian + by_bias(problem.prior, fit, &placed, seen);
             Some(TileEquation {
                 patch,
-                equation: Equation { residual, variance: noise, ..equation },
+                equation: Equation { residual, jacobian, variance: noise, ..equation },
                 noise,
-                expected: single,
-                scatter: single.sqrt(),
-                count: seen.count,
                 spread,
             })
         };

@@ -1,6 +1,6 @@
 //! What the residuals of neighbouring tiles have in common: a wall's dents and stuck feed, or a sensor's smoothed noise.
 
-use crate::surface_fit::polish::TileEquation;
+use crate::surface_fit::equation::TileEquation;
 use crate::surface_fit::solver::tukey;
 use crate::surface_fit::tiles::{DOWN, NONE, Patches, RIGHT};
 
@@ -107,15 +107,7 @@ mod tests {
             let (jacobian, variance) = (Parameters::zeros(), 1e-4);
             Equation { residual, jacobian, variance, cosine: 1.0, part: Part::Cone, z: 1.0, across: [1.0, 0.0] }
         };
-        let tile = |i: usize| TileEquation {
-            patch: i,
-            equation: equation(i),
-            noise: 1e-6,
-            expected: 64e-6,
-            scatter: 8e-3,
-            count: 64.0,
-            spread: 1.0,
-        };
+        let tile = |i: usize| TileEquation { patch: i, equation: equation(i), noise: 1e-6, spread: 1.0 };
         ask(&patches, &(0..patches.list.len()).map(tile).collect::<Vec<_>>())
     }
 

@@ -1,11 +1,9 @@
-//! How sure the fit is: the noise's covariance, widened by what the residuals say about the model, and the scale.
+//! How sure a fit to points is: the noise's covariance, widened by what the residuals say about the model.
 
-use crate::geometry::parameters::{Information, OVALITY, PARAMETERS, Parameters};
+use crate::geometry::parameters::{Information, PARAMETERS, Parameters};
 use crate::surface_fit::common::variance_of_neighbours;
-use crate::surface_fit::polish::TileEquation;
+use crate::surface_fit::equation::TileEquation;
 use crate::surface_fit::solver::{Equation, Fit, Problem, System, tukey, tukey_slope};
-use crate::surface_fit::tiles::DEEPEST;
-use nalgebra::{Matrix4, Vector4};
 
 /// The model's covariance, widened in those directions in which groups of tiles disagree more than it says.
 ///
@@ -81,101 +79,18 @@ fn chance(samples: usize) -> f64 {
     (1.0 + (FREE / samples.max(1) as f64).sqrt()).powi(-2)
 }
 
-/// The share of the wall's relief (corrugation, rust) in the covariance, and of its `form` beside that, metres.
-///
-/// Within a tile the pixels scatter by the sensor's noise and by the wall's relief across it. A grazing ray meets the
-/// relief's crests and not its troughs, so the mean wall is seen shifted inwards. That shift follows the incidence over
-/// the whole frame, and beside that each block of tiles sees its own part of the pattern: neither averages out as noise.
-pub fn relief_uncertainty(
-    joint: &System,
-    fit: &Fit,
-    tiles: &[TileEquation],
-    (relief, form): (f64, f64),
-) -> Information {
-    if relief.max(form) == 0.0 {
+/// What a wall's `form`, by which it lies off its mean over a block of tiles, metres, does to the answer.
+pub fn form_uncertainty(system: &System, fit: &Fit, tiles: &[TileEquation], form: f64) -> Information {
+    if form == 0.0 {
         return Information::zeros();
     }
-    let (mut pull, mut system) = (Parameters::zeros(), joint.prior_alone());
+    let mut blocked = system.prior_alone();
     for TileEquation { equation: e, spread, .. } in tiles {
-        let weight = tukey(e.residual * e.residual / e.variance);
-        let along = (RELIEF_SHARE * relief / e.cosine).hypot(form * spread);
-        let blocked = Equation { variance: along * along * f64::from(BLOCK * BLOCK), ..*e };
-        system.add(&blocked, weight);
-        pull += e.jacobian * (relief * (1.0 - e.cosine) / e.cosine * weight / blocked.variance);
+        let along = form * spread;
+        let variance = along * along * f64::from(BLOCK * BLOCK);
+        blocked.add(&Equation { variance, ..*e }, tukey(e.residual * e.residual / e.variance));
     }
-    system
-        .covariance(fit)
-        .map_or(Information::zeros(), |(spread, _)| spread + spread * pull * (spread * pull).transpose())
-}
-
-/// Whether the residuals show that the silo is oval: the two parts of its ovality against their covariance.
-pub fn shows_ovality(problem: &Problem, fit: &Fit, tiles: &mut [TileEquation], std: f64) -> bool {
-    let mut system = System::with_prior(problem.prior, fit).with_ovality(std);
-    for tile in tiles {
-        tile.allow(fit.misfit);
-        let e = &tile.equation;
-        system.add(e, tukey(e.residual * e.residual / e.variance));
-    }
-    let (Some(step), Some((covariance, _))) = (system.solve(fit), system.covariance(fit)) else { return false };
-    let (found, spread) = (step.fixed_rows::<2>(OVALITY), covariance.fixed_view::<2, 2>(OVALITY, OVALITY));
-    let squared = spread.try_inverse().map_or(0.0, |inverse| found.dot(&(inverse * found)));
-    squared > SURE
-}
-
-/// Chi-square of two degrees of freedom that chance passes once in 20,000 frames.
-const SURE: f64 = 20.0;
-
-/// How far a block's mean lies off by the relief, as a share of it.
-const RELIEF_SHARE: f64 = 0.3;
-
-/// Root-mean-square relief across the wall, metres; 0 where the pixels' scatter needs none beside the noise.
-pub fn relief(tiles: &[TileEquation]) -> f64 {
-    let (mut weights, mut sum) = (0.0, 0.0);
-    for TileEquation { equation: e, expected, scatter, count, .. } in tiles {
-        let across = e.cosine * e.cosine;
-        let noise = expected * across;
-        let weight = count / (2.0 * noise * noise).max(1e-24); // of an estimated variance
-        weights += weight;
-        sum += weight * (scatter * scatter * across - noise);
-    }
-    let (excess, error) = (sum / weights, weights.powf(-0.5));
-    if excess > 5.0 * error + RESOLUTION * RESOLUTION { excess.sqrt().min(DEEPEST) } else { 0.0 }
-}
-
-/// The same where the noise itself has to be told from the scatter: relief grows with the incidence, noise with the depth.
-///
-/// Least squares of the tiles' variances on 1, d² and d⁴ for the noise and 1/cos² for the relief. Where depth and incidence
-/// go together they can't be told apart, and the relief is 0.
-pub fn relief_beside_noise(tiles: &[TileEquation]) -> f64 {
-    let (mut normal, mut right) = (Matrix4::zeros(), Vector4::zeros());
-    let rows = tiles.iter().map(|TileEquation { equation: e, noise, scatter, count, .. }| {
-        let (d2, single) = (e.jacobian[8] * e.jacobian[8], noise * count);
-        let weight = count / (2.0 * single * single).max(1e-24); // of an estimated variance
-        (Vector4::new(1.0, d2, d2 * d2, 1.0 / (e.cosine * e.cosine)), scatter * scatter, weight)
-    });
-    for (row, variance, weight) in rows.clone() {
-        normal += row * row.transpose() * weight;
-        right += row * (variance * weight);
-    }
-    let Some(inverse) = normal.try_inverse() else { return 0.0 };
-    let law = inverse * right;
-    let misfit: f64 = rows.map(|(row, variance, weight)| weight * (variance - row.dot(&law)).powi(2)).sum();
-    let error = (inverse[(3, 3)] * (misfit / tiles.len() as f64).max(1.0)).sqrt();
-    if law[3] > 5.0 * error + RESOLUTION * RESOLUTION { law[3].sqrt().min(DEEPEST) } else { 0.0 }
-}
-
-/// Relief that rounding of raw depths feigns, metres.
-const RESOLUTION: f64 = 3e-4;
-
-/// The share of an unknown depth scale in the covariance: every length of the answer goes with it.
-pub fn scale_uncertainty(fit: &Fit, std: f64) -> Information {
-    let pose = &fit.surface.pose;
-    let intercept = fit.surface.cone.map_or(0.0, |c| c.intercept());
-    let mut lengths = Parameters::zeros();
-    for (k, length) in [(2, pose.t_x), (3, pose.t_y), (4, fit.surface.radius.unwrap_or(0.0)), (6, intercept)] {
-        lengths[k] = length * std;
-    }
-    lengths * lengths.transpose()
+    blocked.covariance(fit).unwrap_or_else(Information::zeros)
 }
 
 /// The smallest covariance that is at least as large as `a` in every direction and as `b` where that is larger.

@@ -32,8 +32,6 @@ pub struct WallEvidence {
     pub behind: f64,
     /// Fraction of all patches that lie behind the cone: it is no closed bottom.
     pub behind_cone: f64,
-    /// Share of what runs along the wall that lies before it.
-    pub stuck: f64,
 }
 
 /// Sums of a regression through the origin with noise-weighted pairs.
@@ -119,7 +117,6 @@ pub fn wall_evidence(patches: &Patches, fit: &Fit, placed: &SurfaceEvaluator, wa
         arc: arc(seats.iter().flatten().map(|s| s.azimuth)),
         behind,
         behind_cone,
-        stuck: 0.0,
     }
 }
 

@@ -47,12 +47,6 @@ pub struct TileEquation {
     pub equation: Equation,
     /// Variance of the residual by the noise alone.
     pub noise: f64,
-    /// Variance of a single pixel along the ray, m², that the noise law expects (a cloud's own); some tiles have more.
-    pub expected: f64,
-    /// Scatter of the pixels about the tile's mean, metres along the ray.
-    pub scatter: f64,
-    /// Number of its pixels.
-    pub count: f64,
     /// How far the residual may be off along this ray, as a multiple of the fit's misfit.
     pub spread: f64,
 }

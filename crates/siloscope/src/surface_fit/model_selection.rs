@@ -7,7 +7,7 @@ use crate::geometry::surface::{FEED_SLOPE, Part, SurfaceTolerance};
 use crate::geometry::view::View;
 use crate::surface_fit::diagnostics::{WallEvidence, wall_evidence};
 use crate::surface_fit::likelihood::{likelihood, may_be_feed};
-use crate::surface_fit::outermost::{FILM, outermost, stuck};
+use crate::surface_fit::outermost::outermost;
 use crate::surface_fit::profile_parts::{Oriented, other_part, steeper_cone};
 use crate::surface_fit::proposals::{Start, starts};
 use crate::surface_fit::solver::{Fit, Prior, Problem};
@@ -132,8 +132,7 @@ pub(crate) fn settled(problem: &Problem, mut fit: Fit) -> Result<Settled, Refusa
         wall = wall_patches(problem, &cone);
         fit = cone;
     }
-    let mut evidence = wall_evidence(problem.patches, &fit, &SurfaceEvaluator::new(fit.surface), &wall);
-    evidence.stuck = stuck(problem, &fit, &wall);
+    let evidence = wall_evidence(problem.patches, &fit, &SurfaceEvaluator::new(fit.surface), &wall);
     judge(&evidence, fit.inside, problem.patches.cloud)?;
     let bare = bare_part(problem, &fit, &wall);
     Ok(Settled { fit, wall, evidence, bare })
@@ -230,32 +229,6 @@ fn bare_part(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Part> {
         (true, false) => Some(Part::Cone),
         (false, true) => Some(Part::Cylinder),
         _ => None,
-    }
-}
-
-/// Leaves out a cylinder that is the smaller part of what is seen and has wall behind it: feed that sticks above the cone.
-pub fn drop_film(problem: &Problem, fit: &mut Fit, wall: &[bool]) {
-    const SKETCH: usize = 3;
-    const SURE: f64 = 5.0;
-    const SHARE: f64 = 0.2;
-    if problem.patches.cloud || !fit.inside || fit.surface.radius.is_none() || fit.surface.cone.is_none() {
-        return;
-    }
-    let (placed, reach) = (SurfaceEvaluator::new(fit.surface), FILM * fit.surface.size());
-    let (mut cylinder, mut cone, mut behind) = (0, 0, 0);
-    for i in (0..wall.len()).step_by(SKETCH).filter(|&i| wall[i] || problem.patches.list[i].smooth) {
-        let Some(contact) = problem.contact(fit, &placed, i) else { continue };
-        let off = contact.residual * contact.cosine;
-        let surely = off > SURE * contact.variance.sqrt() * contact.cosine && off < reach;
-        match (contact.part, wall[i]) {
-            (Part::Cylinder, true) => cylinder += 1,
-            (Part::Cone, true) => cone += 1,
-            (Part::Cylinder, false) if surely => behind += 1,
-            _ => {}
-        }
-    }
-    if cylinder < cone && f64::from(behind) > SHARE * f64::from(cylinder) {
-        fit.surface.radius = None;
     }
 }
 

@@ -48,16 +48,6 @@ impl System {
         system
     }
 
-    /// The same with ovality among the parameters; for a fit that took the silo for round, or had it already.
-    pub fn with_ovality(mut self, std: f64) -> Self {
-        for k in [OVALITY, OVALITY + 1] {
-            if self.prior[(k, k)] == 0.0 {
-                self.add_prior(k, 0.0, std);
-            }
-        }
-        self
-    }
-
     /// Without what the frame says.
     pub fn prior_alone(&self) -> Self {
         Self { information: self.prior, gradient: Parameters::zeros(), prior: self.prior }
@@ -132,8 +122,8 @@ impl System {
         step.iter().all(|s| s.is_finite()).then_some(step)
     }
 
-    /// Covariance of the free parameters (zero rows elsewhere), and which are free.
-    pub fn covariance(&self, fit: &Fit) -> Option<(Information, [bool; PARAMETERS])> {
+    /// Covariance of the free parameters; zero rows elsewhere.
+    pub fn covariance(&self, fit: &Fit) -> Option<Information> {
         let (h, scale, free) = self.scaled(fit);
         let mut covariance = h.cholesky()?.inverse();
         for k in 0..PARAMETERS {
@@ -141,7 +131,7 @@ impl System {
                 covariance[(k, l)] *= if free[k] && free[l] { scale[k] * scale[l] } else { 0.0 };
             }
         }
-        Some((covariance, free))
+        Some(covariance)
     }
 }
 

@@ -8,7 +8,7 @@ use crate::geometry::sensor::{DepthError, NoiseLaw};
 use crate::surface_fit::diagnostics::WallEvidence;
 use crate::surface_fit::frame_factor::FrameFactor;
 use crate::surface_fit::joint::summary::JointSummary;
-use crate::surface_fit::solver::Fit;
+use crate::surface_fit::solver::{Fit, Prior};
 use crate::surface_fit::tiles::Patches;
 use crate::surface_fit::warm_start::KnownWall;
 
@@ -21,20 +21,23 @@ pub struct Knowledge {
     pub radius: Option<(f64, f64)>,
     /// Direction of gravity in the camera frame and its standard deviation, radians.
     pub gravity: Option<(Vec3, f64)>,
-    /// Which vessels may be in view.
-    pub vessels: Vessels,
+    /// Standard deviations of the intrinsics: focal lengths (relative), principal point (rays), k1; 0 where exact.
+    pub camera_std: [f64; 5],
+    /// Whether the vessel is said to end in a cone about its own axis: then one that is seen alone has that axis.
+    pub told_cone: bool,
+    /// Whether an answer that is no vessel's, or not sure, is refused; else it is given, to tell what is wrong with it.
+    pub judged: bool,
 }
 
-/// Which vessels an image may show.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Vessels {
-    /// A cylinder on a coaxial cone, seen through exact intrinsics.
-    Coaxial,
-    /// Those of the joint fit, which compete.
-    Any {
-        /// Standard deviations of the intrinsics: focal lengths (relative), principal point (rays), k1; 0 where exact.
-        camera_std: [f64; 5],
-    },
+impl Knowledge {
+    /// As the fits on tiles have it.
+    pub(crate) fn prior(&self) -> Prior {
+        let mut bias_std = self.error.bias_std;
+        if self.radius.is_some() && bias_std[1] > 0.0 {
+            bias_std[1] = bias_std[1].max(0.05); // a known radius fixes the scale better than any expectation
+        }
+        Prior { bias: self.error.bias, bias_std, radius: self.radius, gravity: self.gravity, ovality_std: 0.0 }
+    }
 }
 
 /// Result of the fit, before it is judged.
@@ -62,7 +65,7 @@ pub struct SurfaceFit {
     pub residuals: Vec<f64>,
     /// Milliseconds of each stage, in order.
     pub timing: Vec<(&'static str, f64)>,
-    /// What the joint fit says beside the wall; `None` where the vessel is a coaxial one, for clouds and views from outside.
+    /// What the joint fit says beside the wall; `None` for clouds and views from outside.
     pub joint: Option<Box<JointSummary>>,
 }
 

@@ -8,7 +8,7 @@ use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::surface_fit::solver::{Contact, Equation, Fit, Problem, System, tukey};
 
 /// Thicker than any film, as a share of the silo's size.
-pub const FILM: f64 = 0.1;
+const FILM: f64 = 0.1;
 /// How far dents and seams put a tile off the ideal wall, metres.
 const FORM: f64 = 1.5e-3;
 /// What is off by more than so many standard deviations of noise and form is not on the surface.
@@ -61,15 +61,6 @@ pub fn outermost(problem: &Problem, fit: &Fit, wall: &[bool]) -> Option<Fit> {
 /// share their noise, which puts patches behind a wall, too.
 fn sides_tell(problem: &Problem, fit: &Fit) -> bool {
     problem.patches.common_noise == 1.0 && fit.inside
-}
-
-/// Share of what runs along the wall that lies before it: feed sticks there, or dents.
-pub fn stuck(problem: &Problem, fit: &Fit, wall: &[bool]) -> f64 {
-    if !sides_tell(problem, fit) {
-        return 0.0;
-    }
-    let before = count(problem, fit, |i| !wall[i], |off| off < -SURE);
-    before / (before + wall.iter().filter(|wall| **wall).count() as f64)
 }
 
 /// How many patches run along the surface behind it.

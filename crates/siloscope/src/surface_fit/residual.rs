@@ -1,9 +1,7 @@
 //! The last step's residuals: every pixel of the wall's tiles against the exact ray–surface intersection.
 
 use crate::geometry::depth_image::DepthImage;
-use crate::geometry::evaluator::SurfaceEvaluator;
 use crate::geometry::sensor::DepthBias;
-use crate::geometry::surface::Part;
 use crate::surface_fit::tile_rays::TileRays;
 use crate::surface_fit::tiles::{MAX_SIDE, Patch, Patches};
 
@@ -27,28 +25,9 @@ pub struct Sampling {
     pub reach: f64,
 }
 
-/// Mean residual of tile `i` of the wall's `part` over its pixels.
-pub fn tile_residual(
-    image: &DepthImage,
-    patches: &Patches,
-    (i, part): (usize, Part),
-    placed: &SurfaceEvaluator,
-    bias: &DepthBias,
-    sampling: Sampling,
-) -> TileResidual {
-    let tile = Tile::of(image, patches, i, bias, sampling);
-    let on_part = |ray: [f64; 2], d: f64| (placed.down(ray) * d < placed.bottom()) == (part == Part::Cylinder);
-    match (part, placed.surface.ovality == [0.0; 2]) {
-        (Part::Cylinder, true) => tile.residual(on_part, |q| placed.cylinder_depth(q)),
-        (Part::Cone, true) => tile.residual(on_part, |q| placed.cone_depth(q)),
-        (Part::Cylinder, false) => tile.residual(on_part, |q| placed.rounded(q, placed.cylinder_depth(q), part)),
-        (Part::Cone, false) => tile.residual(on_part, |q| placed.rounded(q, placed.cone_depth(q), part)),
-    }
-}
-
 /// Mean residual of tile `i` over its pixels against a wall whose true depth on a ray is `depth`, where `on_part` tells
 /// whether a ray ends there.
-pub fn tile_residual_against(
+pub fn tile_residual(
     image: &DepthImage,
     patches: &Patches,
     i: usize,
@@ -276,6 +255,7 @@ impl Quadratic {
 mod tests {
     use super::*;
     use crate::SiloPose;
+    use crate::geometry::evaluator::SurfaceEvaluator;
     use crate::geometry::sensor::NoiseLaw;
     use crate::geometry::surface::SiloSurface;
     use crate::surface_fit::tiles::tile_patches;
@@ -323,7 +303,7 @@ mod tests {
         let (mut told, mut excess) = (0, 0.0);
         for (i, patch) in patches.list.iter().enumerate().filter(|(_, patch)| patch.measured < 6.0) {
             let sampling = Sampling { stride: 1, reach: 2.4e-3 };
-            let found = tile_residual(&image, &patches, (i, Part::Cylinder), &placed, &bias, sampling);
+            let found = tile_residual(&image, &patches, i, &bias, sampling, |_, _| true, |q| placed.cylinder_depth(q));
             let corner = (patch.tile.1 as usize * width + patch.tile.0 as usize) * patches.side;
             let pixels = (0..patches.side.pow(2)).map(|k| corner + k / patches.side * width + k % patches.side);
             let off: Vec<f64> = pixels.map(|i| f64::from(depth[i]) - wall[i]).collect();

@@ -96,14 +96,6 @@ impl Problem<'_> {
         self.contact(fit, placed, i).map(|contact| self.equation_of(placed, &contact))
     }
 
-    /// The equation of patch `i` with its residual left at the distance of the depth `d` from the wall.
-    ///
-    /// With d on the wall, neither the derivative nor the variance depends on the noise of the patch itself. That
-    /// matters: a derivative that carries the residual's own noise pulls the answer along weakly determined directions.
-    pub fn equation_at(&self, fit: &Fit, placed: &SurfaceEvaluator, i: usize, d: f64) -> Option<Equation> {
-        self.contact_at(fit, placed, i, d).map(|contact| self.equation_of(placed, &contact))
-    }
-
     /// The equation of a contact, with its derivative on the wall where the depth bias is free.
     ///
     /// The bias trades against the pose along a weak direction, in which the noise in derivatives outweighs the frame.

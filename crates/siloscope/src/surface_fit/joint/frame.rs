@@ -16,4 +16,6 @@ pub struct Frame<'a> {
     pub form: &'a Form,
     /// What is known before.
     pub inputs: &'a Inputs,
+    /// Whether the vessel is said to end in a coaxial cone.
+    pub told_cone: bool,
 }

@@ -64,7 +64,7 @@ pub fn judge(frame: &Frame, search: &Search, known: bool) -> Result<(), Refusal>
     let sound = fit.state.x[SLOPE] < HOPPER_SLOPE && is_round(fit);
     let agrees = frame.inputs.gravity.is_some() && agrees_with_gravity(frame, fit, best.model);
     let leads = best.model.is_cone_alone() || !known && (cylinder < LEAST_CYLINDER || weak && !sound);
-    if leads && !agrees {
+    if leads && !agrees && !frame.told_cone {
         return Err(Refusal::ConeAlone);
     }
     let size = fit.state.size();

@@ -50,7 +50,7 @@ use crate::surface_fit::joint::solve::JointFit;
 use crate::surface_fit::joint::summary::JointSummary;
 use crate::surface_fit::model_selection::{Settled, oriented};
 use crate::surface_fit::outcome::{
-    Knowledge, MAX_DIRECTION_STD, MAX_POSITION_STD, Outcome, SurfaceFit, Vessels, check_determined,
+    Knowledge, MAX_DIRECTION_STD, MAX_POSITION_STD, Outcome, SurfaceFit, check_determined,
 };
 use crate::surface_fit::profile_parts::other_part;
 use crate::surface_fit::solver::{Fit, Problem};
@@ -82,7 +82,7 @@ pub fn fit_inside(problem: &Problem, image: &DepthImage, know: &Knowledge, start
     let scale_is_free = know.radius.is_some() && problem.prior.bias_std[1] > 0.0;
     let readings = Readings::new(problem.patches, &problem.noise, &know.error.bias, problem.pixel);
     let (inputs, form) = (inputs(problem, know, scale_is_free), Form::default());
-    let frame = Frame { readings: &readings, image, form: &form, inputs: &inputs };
+    let frame = Frame { readings: &readings, image, form: &form, inputs: &inputs, told_cone: know.told_cone };
     let placed = |fit: &Fit| {
         let mut fit = fit.clone();
         if let (Some((radius, _)), true) = (know.radius, scale_is_free) {
@@ -94,7 +94,8 @@ pub fn fit_inside(problem: &Problem, image: &DepthImage, know: &Knowledge, start
     let (found, near) = match start {
         Start::Known(wall) => (search_again(&frame, &placed(&wall.fit())).ok_or(Refusal::NoWall)?, None),
         Start::Searched(near, proposals) => {
-            let from = near.map(|s| placed(&Fit { surface: s.fit.surface.without(s.bare), ..s.fit.clone() }));
+            let near = near.map(|s| Settled { fit: placed(&s.fit), ..s.clone() });
+            let from = near.as_ref().map(|s| Fit { surface: s.fit.surface.without(s.bare), ..s.fit.clone() });
             let proposals: Vec<Fit> = proposals.iter().map(placed).collect();
             let oriented = oriented(problem, &bias);
             (search(&frame, from.as_ref(), &proposals, |surface| other_part(surface, &oriented)), near)
@@ -102,9 +103,11 @@ pub fn fit_inside(problem: &Problem, image: &DepthImage, know: &Knowledge, start
     };
     let known = matches!(start, Start::Known(_));
     clock.lap(if known { "known wall" } else { "models" });
-    judge(&frame, &found, known)?;
+    if know.judged {
+        judge(&frame, &found, known)?;
+    }
     let scale = if scale_is_free { 0.0 } else { know.error.bias_std[1] };
-    let outcome = told(problem, &frame, &found, scale, near);
+    let outcome = told(problem, &frame, (&found, know.judged), scale, near.as_ref());
     clock.lap("answer");
     outcome
 }
@@ -115,15 +118,17 @@ fn inputs(problem: &Problem, know: &Knowledge, scale_is_free: bool) -> Inputs {
         bias_std[1] = 0.0;
     }
     let gravity = know.gravity.map(|(down, std)| (SiloPose::from_axis(&down, &Vec3::zeros()), std));
-    let camera_std = match know.vessels {
-        Vessels::Any { camera_std } => camera_std,
-        Vessels::Coaxial => [0.0; 5],
-    };
-    Inputs { bias: know.error.bias, bias_std, radius: know.radius, gravity, camera_std }
+    Inputs { bias: know.error.bias, bias_std, radius: know.radius, gravity, camera_std: know.camera_std }
 }
 
-/// The answer of a search, if it stands up to the evidence of a wall of revolution.
-fn told(problem: &Problem, frame: &Frame, found: &Search, scale: f64, near: Option<&Settled>) -> Outcome {
+/// The answer of a search, if it stands up to the evidence of a wall of revolution, and where it is judged, if it is sure.
+fn told(
+    problem: &Problem,
+    frame: &Frame,
+    (found, judged): (&Search, bool),
+    scale: f64,
+    near: Option<&Settled>,
+) -> Outcome {
     let best = found.weighed.first().ok_or(Refusal::NoWall)?;
     let fit = found.fits.get(best.fit).ok_or(Refusal::NoWall)?;
     let tiles = tile_fit(fit, best.model);
@@ -141,11 +146,12 @@ fn told(problem: &Problem, frame: &Frame, found: &Search, scale: f64, near: Opti
     let answer = answer(frame, found, hopper, scale).ok_or(Refusal::PoorlyDetermined)?;
     let heights = fit.sights.iter().zip(&fit.labels.wall).filter(|(_, p)| **p > 0.5).filter_map(|(s, _)| *s);
     let (sum, n) = heights.fold((0.0, 0.0), |(sum, n), s| (sum + s.at.z, n + 1.0));
-    let position = MAX_POSITION_STD * fit.state.size();
-    if is_ambiguous(found, MAX_DIRECTION_STD, position) {
-        return Err(Refusal::AmbiguousVessel);
+    if judged {
+        if is_ambiguous(found, MAX_DIRECTION_STD, MAX_POSITION_STD * fit.state.size()) {
+            return Err(Refusal::AmbiguousVessel);
+        }
+        check_determined(&answer.covariance, &SurfaceEvaluator::new(answer.surface), sum / f64::max(n, 1.0))?;
     }
-    check_determined(&answer.covariance, &SurfaceEvaluator::new(answer.surface), sum / f64::max(n, 1.0))?;
     let factor = frame_factor(frame, fit, (best.model, hopper), scale);
     Ok(surface_fit(problem, (fit, best.model), (answer, factor), evidence, near))
 }
@@ -183,7 +189,7 @@ fn surface_fit(
     let tiles =
         Fit { surface: answer.surface, bias, inside: true, misfit: fit.tau[0].max(fit.tau[1]), weights: Vec::new() };
     let shown = tile_fit(fit, model).surface; // its cone may be no hopper's, and still be there in the next frame
-    let mut wall = KnownWall { surface: shown, bias, inside: true, misfit: tiles.misfit, oval: false };
+    let mut wall = KnownWall { surface: shown, bias, inside: true, misfit: tiles.misfit };
     if let Some(near) = near {
         wall = KnownWall::of(near);
         wall.drop_parts_without(&shown);

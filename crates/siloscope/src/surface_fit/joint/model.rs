@@ -75,6 +75,11 @@ impl Model {
         matches!(self, Self::ConeAlone | Self::ObliqueConeAlone)
     }
 
+    /// Whether it is a hopper with its outlet aside.
+    pub fn is_oblique(self) -> bool {
+        matches!(self, Self::ObliqueCone | Self::ObliqueConeAlone)
+    }
+
     /// Standard deviations of the cone's offset (as a fraction of the radius) and obliquity, with a building tolerance.
     fn cone_widths(self, tolerance: f64) -> [f64; 2] {
         match self {
@@ -137,8 +142,9 @@ pub struct Amplitudes {
 
 /// Pseudo-coefficients of an amplitude's prior: its first value counts as so many.
 pub const PSEUDO_COEFFICIENTS: f64 = 1.0;
-/// Form of a wall that is as good as ideal, over the first amplitudes; and its cone's tolerance over the usual one.
-const IDEAL: f64 = 0.1;
+/// Form of a wall that is ideal to what pixels resolve, over the first amplitudes; and its cone's tolerance over the usual
+/// one.
+const IDEAL: f64 = 0.01;
 /// The same for the intrinsics' common factor.
 const CAMERA_PSEUDO: f64 = 4.0;
 /// Range of that factor: deviations that are stated are not made smaller, and beyond five of them a frame contradicts
@@ -151,7 +157,7 @@ impl Amplitudes {
         Self { form: GROUPS.map(|g| g.bounds(size).first), camera: 1.0 }
     }
 
-    /// Amplitudes of a wall that is as good as ideal: a tenth of the first ones.
+    /// Amplitudes of a wall that is as good as ideal.
     pub fn ideal(&self, size: f64) -> Self {
         Self { form: GROUPS.map(|g| IDEAL * g.bounds(size).first), camera: self.camera }
     }

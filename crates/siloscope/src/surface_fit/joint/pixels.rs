@@ -4,7 +4,7 @@ use crate::geometry::surface::Part;
 use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::labels::Labels;
 use crate::surface_fit::joint::predict::{Predictor, Sight};
-use crate::surface_fit::residual::{Sampling, tile_residual_against};
+use crate::surface_fit::residual::{Sampling, tile_residual};
 
 /// Tiles less likely to be wall keep their own mean.
 const LIKELY: f64 = 0.02;
@@ -45,6 +45,6 @@ fn pixel_mean(frame: &Frame, predictor: &Predictor, tau: [f64; 2], i: usize, see
     let (bias, bulge) = (predictor.state.bias(), predictor.bulge_at(&seen));
     let depth = |ray: [f64; 2]| predictor.true_depth(ray, part, bulge);
     let on_part = |ray: [f64; 2], _: f64| predictor.ends_on(ray, part, bulge);
-    let found = tile_residual_against(frame.image, frame.readings.patches, i, &bias, sampling, on_part, depth);
+    let found = tile_residual(frame.image, frame.readings.patches, i, &bias, sampling, on_part, depth);
     (found.count >= ENOUGH * patch.count).then_some(Sight { residual: found.mean, ..seen })
 }

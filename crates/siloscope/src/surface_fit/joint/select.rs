@@ -32,7 +32,7 @@ pub fn weigh(frame: &Frame, fits: &[JointFit]) -> Vec<Weighed> {
     for (k, fit) in fits.iter().enumerate() {
         let likelihood: f64 = fit.labels.log_likelihood.iter().zip(&factors).map(|(ll, f)| ll / f).sum();
         let rest = fit.amplitudes.log_prior(fit.state.size()) - DEPOSIT_COST * fit.labels.patches as f64;
-        for &model in Model::of(&fit.state) {
+        for &model in Model::of(&fit.state).iter().filter(|model| !frame.told_cone || !model.is_oblique()) {
             let Some(posterior) = fit.posterior(frame, model) else { continue };
             let log_evidence = likelihood + rest + posterior.log_evidence + model.log_prior();
             let mean = std::array::from_fn(|i| fit.state.x[i] + posterior.step[i]);
