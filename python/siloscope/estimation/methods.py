@@ -27,9 +27,7 @@ def priors_of(frame: Prepared, settings: Settings) -> Priors:
         return Priors(CLOUD, settings.diameter, settings.gravity)
     profile = settings.profile if frame.turn is None else replace(settings.profile, map=None)  # no image, no map
     camera_std = settings.intrinsics_std(frame).of_rays(frame.camera)
-    return Priors(
-        profile, settings.diameter, settings.gravity, camera_std=camera_std, told_cone=settings.told_cone
-    )
+    return Priors(profile, settings.diameter, settings.gravity, camera_std=camera_std, told_cone=settings.told_cone)
 
 
 def _surface(frame: Prepared, settings: Settings, config: dict[str, Any]) -> Estimate:
