@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from siloscope import sensors
 from siloscope.content.capacity import complete, lacking
+from siloscope.content.taped import taped
 from siloscope.errors import InputError, UsageError
 from siloscope.sensors import SensorProfile
 from siloscope.types.calibration import Calibration
@@ -97,15 +98,16 @@ def know(
             "out, or calibrate with it"
         )
     sheet = _with_tape(sheet, calibration)
-    floor, remarks = floor_of(calibration, sheet, steepest)
+    remarks = _other_diameter(diameter, calibration)
+    calibration = taped(calibration, diameter)
+    floor, contradicted = floor_of(calibration, sheet, steepest)
     if floor.kind == "flat":
         sheet = replace(sheet, bottom="flat", cone=None)
     calibration = with_cone(calibration) if has_seen_cone(floor) else _without_cone(calibration)
     lengths = _cone_alone(calibration, _joint(calibration, complete(calibration.silo, sheet, top), sheet))
     floor = _placed(floor, sheet, lengths.geometry)
     covariance = _covariance(calibration, lengths)
-    remarks += _other_diameter(diameter, calibration.silo, float(covariance[4, 4]))
-    remarks += _other_joint(calibration, sheet, top)
+    remarks += contradicted + _other_joint(calibration, sheet, top)
     assumed = list(lengths.assumed)
     if profile.noise is None:
         assumed.append("noise of a typical structured-light sensor")
@@ -160,10 +162,10 @@ def _without_cone(calibration: Calibration) -> Calibration:
 
 def _with_tape(sheet: Datasheet, calibration: Calibration) -> Datasheet:
     """The datasheet with the diameter that the calibration was given, where it has none of its own."""
-    taped = calibration.config.get("diameter")
-    if sheet.diameter is not None or not isinstance(taped, int | float):
+    own = calibration.config.get("diameter")
+    if sheet.diameter is not None or not isinstance(own, int | float):
         return sheet
-    return replace(sheet, diameter=float(taped))
+    return replace(sheet, diameter=float(own))
 
 
 def filled_to(known: Knowledge, vessel: Vessel) -> Knowledge:
@@ -277,10 +279,12 @@ def _jacobian(calibration: Calibration, lengths: Lengths) -> NDArray[np.float64]
     return np.nan_to_num(jacobian)
 
 
-def _other_diameter(diameter: float | None, silo: SiloGeometry, variance: float) -> tuple[Remark, ...]:
-    """A warning where a tape-measured diameter differs from the calibration's; it belongs into the calibration."""
+def _other_diameter(diameter: float | None, calibration: Calibration) -> tuple[Remark, ...]:
+    """A warning where a diameter contradicts the calibration's; it belongs into the calibration."""
+    silo, covariance = calibration.silo, calibration.parameter_covariance
     if diameter is None or silo.radius is None:
         return ()
+    variance = 0.0 if covariance is None else float(covariance[4, 4])
     gap, std = abs(diameter - 2.0 * silo.radius), math.hypot(2.0 * math.sqrt(variance), LENGTH_STD)
     if gap > ANOTHER_VESSEL * diameter:
         raise UsageError(
