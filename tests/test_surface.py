@@ -223,9 +223,9 @@ def test_gravity_that_contradicts_the_wall_is_refused() -> None:
 def test_a_cone_that_is_told_has_the_silos_axis(seed: int) -> None:
     """Seen alone it may be oblique, or feed, and is refused; said to be the vessel's own, it leaves no other model."""
     scene = random_scene(seed, Feed(("funnel", "flat", "mound", "gaussian")[seed % 4], 0.15), sensor=ASTRA_S)
-    known = {"diameter": 2.0 * scene.silo.radius}
-    assert fit(scene, "orbbec-astra-s", **known).reason == "cone-alone"
-    told = fit(scene, "orbbec-astra-s", told_cone=True, **known)
+    diameter = 2.0 * scene.silo.radius
+    assert fit(scene, "orbbec-astra-s", diameter=diameter).reason == "cone-alone"
+    told = fit(scene, "orbbec-astra-s", told_cone=True, diameter=diameter)
     assert told.pose is not None
     assert told.covariance is not None
     error = np.array([getattr(told.pose, name) - getattr(scene.pose, name) for name in POSE])
