@@ -96,19 +96,9 @@ const Roles = () => {
 
 const Places = ({ places, chosen = "" }: { places: Place[]; chosen?: string }) => {
   const { t } = useWords();
-  return (
-    <label class="field">
-      {t("settings.place")}
-      <select name="place">
-        <option value="">{t("settings.everywhere")}</option>
-        {places.map((place) => (
-          <option key={place.id} value={place.id} selected={place.id === chosen}>
-            {place.name}
-          </option>
-        ))}
-      </select>
-    </label>
-  );
+  const of = places.map((place) => ({ value: place.id, text: place.name }));
+  const everywhere = { value: "", text: t("settings.everywhere") };
+  return <ChoiceEntry name="place" label={t("settings.place")} value={chosen} of={[everywhere, ...of]} />;
 };
 
 function Person({ user, places }: { user: User; places: Place[] }) {

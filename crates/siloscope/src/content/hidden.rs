@@ -3,9 +3,10 @@
 use super::grid::Grid;
 use super::under::Under;
 use super::volume::Kind;
+use crate::geometry::surface::FEED_SLOPE;
 
-/// Steepest rise of feed at rest on a floor, tan 36°: drained angles of repose of grain and pellets reach it.
-const RISE: f64 = 0.727;
+/// Steepest rise of feed at rest on a floor.
+const RISE: f64 = 1.0 / FEED_SLOPE;
 
 /// Most that can lie on the floor that no cell shows, cubic metres, where nothing lies on the floor that is seen.
 ///

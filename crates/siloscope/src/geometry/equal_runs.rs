@@ -14,7 +14,7 @@ pub struct EqualRuns {
 }
 
 impl EqualRuns {
-    /// Adds a line's runs of two or more pixels with a measurement; `long` is a length in pixels.
+    /// Adds a line of depths, 0 or NaN for no measurement; a run of `long` pixels is a long one.
     pub fn add(&mut self, line: &[f32], long: usize) {
         for run in line.chunk_by(|a, b| a == b).filter(|run| run.first().is_some_and(|&d| d > 0.0)) {
             self.measured += run.len();

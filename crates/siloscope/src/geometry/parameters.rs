@@ -39,6 +39,8 @@ pub const CONE_INTERCEPT: usize = 6;
 pub const BIAS: Range<usize> = 7..10;
 /// Index of the depth bias's scale.
 pub const SCALE: usize = 8;
+/// Index of the depth bias's quadratic part.
+pub const QUADRATIC: usize = 9;
 /// Index of the first of the ovality's two parameters.
 pub const OVALITY: usize = 10;
 
@@ -47,3 +49,39 @@ pub type Parameters = SVector<f64, PARAMETERS>;
 
 /// Information or covariance over `Parameters`.
 pub type Information = SMatrix<f64, PARAMETERS, PARAMETERS>;
+
+/// The share of an unknown depth scale in a covariance: every length goes with it, and what the sensor reads stays as it is.
+///
+/// Where all lengths are λ times as long, 1 + b becomes (1 + b) / λ and q becomes q / λ². Lengths that are not finite were
+/// not seen and have no share.
+pub fn scale_share(parameters: &Parameters, std: f64) -> Information {
+    let rate = |k: usize| match (k, parameters[k]) {
+        (2 | 3 | RADIUS | CONE_INTERCEPT, length) if length.is_finite() => length,
+        (SCALE, b) => -(1.0 + b),
+        (QUADRATIC, q) => -2.0 * q,
+        _ => 0.0,
+    };
+    let along = Parameters::from_fn(|k, _| std * rate(k));
+    along * along.transpose()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_unknown_scale_leaves_readings_as_they_are() {
+        let mut p = Parameters::from_fn(|k, _| 0.1 * k as f64 + 0.2);
+        p[CONE_SLOPE] = f64::NAN;
+        p[CONE_INTERCEPT] = f64::NAN;
+        let (std, depth) = (1e-4, 3.0);
+        let share = scale_share(&p, std);
+        let step = share.column(RADIUS) / (p[RADIUS] * std); // along the only direction, one deviation of the scale
+        let longer = 1.0 + std;
+        let reading = |p: &Parameters, d: f64| p[BIAS.start] + (1.0 + p[SCALE]) * d + p[QUADRATIC] * d * d;
+        let moved = p + step;
+        assert!((reading(&moved, depth * longer) - reading(&p, depth)).abs() < 1e-6);
+        assert!((moved[2] - longer * p[2]).abs() < 1e-12 && (moved[3] - longer * p[3]).abs() < 1e-12);
+        assert_eq!(share.column(CONE_INTERCEPT), Parameters::zeros());
+    }
+}

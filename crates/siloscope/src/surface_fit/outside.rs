@@ -4,9 +4,8 @@ use crate::Vec3;
 use crate::base::refusal::Refusal;
 use crate::geometry::depth_image::DepthImage;
 use crate::geometry::evaluator::SurfaceEvaluator;
-use crate::geometry::parameters::{Information, Parameters};
+use crate::geometry::parameters::scale_share;
 use crate::geometry::sensor::DepthBias;
-use crate::geometry::surface::SiloSurface;
 use crate::stats::robust::upper_median;
 use crate::surface_fit::cloud::tiled;
 use crate::surface_fit::cloud_equations::CloudWall;
@@ -30,7 +29,8 @@ pub fn fit_outside(problem: &Problem, image: &DepthImage, know: &Knowledge, mut 
     result.residuals = residuals(problem, &result.fit, &wall);
     if !scale_is_free {
         result.factor.scale_std = know.error.bias_std[1];
-        result.covariance += scale_uncertainty(&result.fit, know.error.bias_std[1]);
+        let parameters = result.fit.surface.parameters(&result.fit.bias);
+        result.covariance += scale_share(&parameters, know.error.bias_std[1]);
     }
     Ok(result)
 }
@@ -53,17 +53,6 @@ fn pixels(problem: &Problem, image: &DepthImage, wall: &[bool]) -> (Vec<(Vec3, f
         }
     }
     (pixels, on_wall)
-}
-
-/// The share of an unknown depth scale in the covariance: every length of the answer goes with it.
-fn scale_uncertainty(fit: &Fit, std: f64) -> Information {
-    let SiloSurface { pose, radius, cone, .. } = fit.surface;
-    let mut lengths = Parameters::zeros();
-    let intercept = cone.map_or(0.0, |cone| cone.intercept());
-    for (k, length) in [(2, pose.t_x), (3, pose.t_y), (4, radius.unwrap_or(0.0)), (6, intercept)] {
-        lengths[k] = length * std;
-    }
-    lengths * lengths.transpose()
 }
 
 /// Side of the wall's tiles in the middle of what is seen of it, metres.

@@ -1,8 +1,7 @@
 //! From the weighed models to an answer in the twelve parameters that frames share.
 
 use crate::geometry::convex_vessel::ConvexVessel;
-use crate::geometry::parameters as parameter;
-use crate::geometry::parameters::{Information, PARAMETERS, Parameters};
+use crate::geometry::parameters::{Information, PARAMETERS, Parameters, scale_share};
 use crate::geometry::surface::{Cone, SiloSurface};
 use crate::surface_fit::joint::frame::Frame;
 use crate::surface_fit::joint::model::Model;
@@ -136,19 +135,4 @@ fn project(map: &Projection, covariance: &DMatrix<f64>) -> Information {
     let half = DMatrix::from_fn(PARAMETERS, SIZE, |r, c| map[(r, c)]);
     let full = &half * covariance * half.transpose();
     Information::from_fn(|r, c| 0.5 * (full[(r, c)] + full[(c, r)]))
-}
-
-/// The share of an unknown depth scale: every length goes with it, and what the sensor reads stays as it is.
-///
-/// Where all lengths are λ times as long, 1 + b becomes (1 + b) / λ and q becomes q / λ².
-fn scale_share(parameters: &Parameters, std: f64) -> Information {
-    let (scale, quadratic) = (parameter::BIAS.start + 1, parameter::BIAS.start + 2);
-    let rate = |k: usize| match parameters[k] {
-        length if [2, 3, 4, 6].contains(&k) && length.is_finite() => length,
-        b if k == scale => -(1.0 + b),
-        q if k == quadratic => -2.0 * q,
-        _ => 0.0,
-    };
-    let along = Parameters::from_fn(|k, _| std * rate(k));
-    along * along.transpose()
 }
