@@ -5,7 +5,7 @@ use super::jacobian::{CalibrationJacobian, Covariance, DEPTH, POSE};
 use super::silo_points::SiloPoints;
 use crate::geometry::sensor::NoiseLaw;
 use crate::geometry::vessel::Vessel;
-use crate::stats::robust::tukey_weight;
+use crate::stats::robust::{TUKEY, tukey_weight};
 use nalgebra::{Matrix4, Vector4};
 
 /// How far the wall seems to have moved, as a change of the camera's pose (r_x, r_y, t_x, t_y).
@@ -29,9 +29,8 @@ const GATE: f64 = 0.08;
 const CLEARANCE: f64 = 0.1;
 /// Unevenness of a wall over short distances, metres: what a return's distance scatters beside the sensor's noise.
 const UNEVEN: f64 = 0.005;
-/// Rounds of reweighting, and the residual beyond which a return loses all say, in standard deviations.
+/// Rounds of reweighting.
 const ROUNDS: usize = 4;
-const CUTOFF: f64 = 5.0;
 /// Fewest returns that tell.
 const FEWEST: usize = 60;
 
@@ -83,7 +82,7 @@ fn normal_equations(residuals: &[Residual], change: &Vector4<f64>) -> (Matrix4<f
     let (mut normal, mut right) = (Matrix4::identity() * 1e-6, Vector4::zeros());
     for r in residuals {
         let left = r.after(change) / r.sigma;
-        let weight = tukey_weight(left * left, CUTOFF) / (r.sigma * r.sigma);
+        let weight = tukey_weight(left * left, TUKEY) / (r.sigma * r.sigma);
         normal += weight * r.by_pose * r.by_pose.transpose();
         right -= weight * r.by_pose * r.distance;
     }

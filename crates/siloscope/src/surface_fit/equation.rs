@@ -4,19 +4,16 @@ use crate::geometry::parameters::Parameters;
 use crate::geometry::surface::Part;
 use crate::stats::robust;
 
-/// Residuals beyond this many standard deviations have no weight (Tukey's constant).
-const TUKEY: f64 = 4.7;
-
 /// Tukey's weight for a squared residual in units of its variance.
 #[inline]
 pub fn tukey(squared: f64) -> f64 {
-    robust::tukey_weight(squared, TUKEY)
+    robust::tukey_weight(squared, robust::TUKEY)
 }
 
 /// Derivative of residual × weight by the residual, for a squared residual in units of its variance.
 #[inline]
 pub fn tukey_slope(squared: f64) -> f64 {
-    robust::tukey_slope(squared, TUKEY)
+    robust::tukey_slope(squared, robust::TUKEY)
 }
 
 /// One patch's equation.
