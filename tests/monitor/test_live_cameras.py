@@ -153,12 +153,12 @@ def test_a_frame_without_room_waits_where_it_is(tmp_path: Path, quick: None) -> 
     path = written(inbox, "a.png", frame_bytes(0.5))
     service = farm.make(tmp_path / "farm")
     limits = service.settings.limits
-    service.intake._limits = replace(limits, queue=0)
+    service.intake.limits = replace(limits, queue=0)
     with driving(service, FolderSource(inbox, LARGEST, removes=True)):
         eventually(lambda: state(service)["state"] == live.FAILING)
         assert "wait to be measured" in state(service)["problem"]
         assert path.exists()
-        service.intake._limits = limits
+        service.intake.limits = limits
         eventually(lambda: state(service)["state"] == live.OK)
         assert len(hashes(service)) == 1
         eventually(lambda: not path.exists())
@@ -266,13 +266,13 @@ def test_a_device_whose_driver_dies_is_started_again(
     monkeypatch.setattr("siloscope.monitor.live.device.SETTLE_S", 0.0)
     service = farm.make(tmp_path / "farm")
     seen: list[str | None] = []
-    tell = Driver._tell
+    tell = live.tell
 
-    def told(self: Driver, state: str, problem: str | None) -> None:
+    def told(connection: Any, camera: str, state: str, problem: str | None, now: float) -> None:
         seen.append(problem)
-        tell(self, state, problem)
+        tell(connection, camera, state, problem, now)
 
-    monkeypatch.setattr(Driver, "_tell", told)
+    monkeypatch.setattr(live, "tell", told)
     with driving(service, DeviceSource(Depth)):
         eventually(lambda: len(hashes(service)) >= 5)
     assert any(problem and "ended unexpectedly" in problem for problem in seen)

@@ -209,6 +209,7 @@ def test_a_lost_link_blanks_nothing_and_comes_back(chromium: Any, farm: Running)
             assert "loaded" in page.locator(".lost").inner_text()
             page.get_by_role("link", name="Alerts").click()
             page.get_by_role("link", name="Silos", exact=True).click()
+            page.get_by_role("heading", name="All silos").wait_for()
             assert page.locator(".card").count() == 6, "views that were seen stay"
             wire.sent.clear()
             wire.mend()

@@ -63,7 +63,9 @@ class Intake:
     """Takes frames in."""
 
     def __init__(self, store: Store, blobs: Blobs, limits: Limits, clock: Clock) -> None:
-        self._store, self._blobs, self._limits, self._clock = store, blobs, limits, clock
+        self._store, self._blobs, self._clock = store, blobs, clock
+        self.limits = limits
+        """What is taken in; may be changed while it runs."""
         self._recorder = Recorder(store)
         self._counted, self._waiting = float("-inf"), 0
 
@@ -102,8 +104,8 @@ class Intake:
         part.format = format_of(head[:HEAD]) or ""
 
     def _check_length(self, length: int) -> None:
-        if length > self._limits.body:
-            raise Problem("too-large", f"the body has more than {self._limits.body} bytes; send one frame a request")
+        if length > self.limits.body:
+            raise Problem("too-large", f"the body has more than {self.limits.body} bytes; send one frame a request")
 
     def _room(self, told: Told, check: Check | None) -> Taken | None:
         """The frame, where it was taken before; raises `Problem` where there is no room for another."""
@@ -114,11 +116,11 @@ class Intake:
             known = frames.find(connection, told.camera, told.sha256) if told.sha256 else None
             if known is not None and not frames.lost(known) and (known.kept or not told.archived):
                 return Taken(known.id, False)
-            if self._in_queue(connection) >= self._limits.queue:
-                detail = f"{self._limits.queue} frames wait to be measured; keep the frame and send it later"
+            if self._in_queue(connection) >= self.limits.queue:
+                detail = f"{self.limits.queue} frames wait to be measured; keep the frame and send it later"
                 raise Problem("too-many", detail, {"Retry-After": str(RETRY_S)})
         free, total = self._blobs.free()
-        if free < min(self._limits.reserve, int(self._limits.reserve_fraction * total)):
+        if free < min(self.limits.reserve, int(self.limits.reserve_fraction * total)):
             raise full(self._blobs)
         return None
 
