@@ -268,7 +268,7 @@ def test_a_device_whose_driver_dies_is_started_again(
     seen: list[str | None] = []
     tell = live.tell
 
-    def told(connection: Any, camera: str, state: str, problem: str | None, now: float) -> None:
+    def told(connection: Any, camera: str, state: str, problem: str | None, now: int) -> None:
         seen.append(problem)
         tell(connection, camera, state, problem, now)
 
